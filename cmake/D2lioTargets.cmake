@@ -1,0 +1,58 @@
+# Warnings, sanitizers, tests and benchmarks, declared once for every part of the project.
+
+# d2lio_own(<target>): our warning flags (as errors) and, where asked for, sanitizers.
+function(d2lio_own target)
+  target_compile_options(${target} PRIVATE -Wall -Wextra -Wconversion -Werror)
+  if(D2LIO_SANITIZE)
+    target_compile_options(${target} PUBLIC -fsanitize=${D2LIO_SANITIZE}
+                           -fno-sanitize-recover=all -fno-omit-frame-pointer)
+    target_link_options(${target} PUBLIC -fsanitize=${D2LIO_SANITIZE})
+  endif()
+endfunction()
+
+# d2lio_tests(<name> <library> <folder>): one GoogleTest binary from <folder>/test_*.cpp.
+function(d2lio_tests name library folder)
+  file(GLOB sources CONFIGURE_DEPENDS ${folder}/test_*.cpp)
+  if(NOT D2LIO_BUILD_TESTS OR NOT sources)
+    return()
+  endif()
+  add_executable(${name} ${sources})
+  target_link_libraries(${name} PRIVATE ${library} GTest::gtest_main)
+  d2lio_own(${name})
+  add_test(NAME ${name} COMMAND ${name})
+endfunction()
+
+# d2lio_bench(<name> <library> <folder>): one Google Benchmark binary from <folder>/bench_*.cpp.
+function(d2lio_bench name library folder)
+  file(GLOB sources CONFIGURE_DEPENDS ${folder}/bench_*.cpp)
+  if(NOT D2LIO_BUILD_BENCH OR NOT sources)
+    return()
+  endif()
+  add_executable(${name} ${sources})
+  target_link_libraries(${name} PRIVATE ${library} benchmark::benchmark_main)
+  d2lio_own(${name})
+endfunction()
+
+# d2lio_headers_alone(<name> <library> <include dir> [standard]): every header compiles by itself.
+function(d2lio_headers_alone name library include_dir)
+  if(NOT D2LIO_BUILD_TESTS)
+    return()
+  endif()
+  file(GLOB_RECURSE headers CONFIGURE_DEPENDS RELATIVE ${include_dir} ${include_dir}/*.hpp)
+  set(sources)
+  foreach(header ${headers})
+    string(MAKE_C_IDENTIFIER ${header} id)
+    set(source ${CMAKE_CURRENT_BINARY_DIR}/${name}/${id}.cpp)
+    file(CONFIGURE OUTPUT ${source} CONTENT "#include \"${header}\"\n#include \"${header}\"\n")
+    list(APPEND sources ${source})
+  endforeach()
+  if(NOT sources)
+    return()
+  endif()
+  add_library(${name} OBJECT ${sources})
+  target_link_libraries(${name} PRIVATE ${library})
+  d2lio_own(${name})
+  if(ARGC GREATER 3)
+    set_target_properties(${name} PROPERTIES CXX_STANDARD ${ARGV3})
+  endif()
+endfunction()
