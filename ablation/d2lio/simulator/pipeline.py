@@ -1,0 +1,281 @@
+# SPDX-FileCopyrightText: 2026 D2-LIO contributors
+# SPDX-License-Identifier: BSD-3-Clause
+"""Simulation of one sequence: scene, sensors and trajectory in, a directory out."""
+
+from __future__ import annotations
+
+import errno
+import os
+import shutil
+import tempfile
+import zlib
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from d2lio.errors import ConfigError, DataError
+from d2lio.sequence import FILE_NAME, ImuInfo, LidarInfo, Sequence
+from d2lio.simulator import imu as imu_model
+from d2lio.simulator import returns
+from d2lio.simulator.bag import POINT, BagWriter
+from d2lio.simulator.imu import IMU_GRADES, ImuGrade
+from d2lio.simulator.lidar import SCAN_NS, SENSORS, Rays, Sensor
+from d2lio.simulator.scenes import SCENES
+from d2lio.simulator.trajectory import Trajectory, euler_to_matrix
+from d2lio.simulator.world import World
+
+EPOCH_NS = 1_700_000_000_123_456_789  # stamp of t = 0
+LEAD_NS = 150_000_000  # the IMU runs this much longer than the lidar, at both ends
+LIDAR_TOPIC = "/lidar/points"
+IMU_TOPIC = "/imu/data"
+LEVER_ARM = (0.03, 0.05, 0.08)  # m, lidar origin in the IMU frame
+MOUNT_DEG = (1.2, -0.8, 0.5)  # yaw, pitch, roll of the lidar in the IMU frame
+MIN_DURATION = 2 * LEAD_NS * 1e-9 + 0.2
+MAX_DURATION = 3600.0
+
+Progress = Callable[[int, int], None]
+
+
+@dataclass(frozen=True)
+class Seeds:
+    """Independent seeds of the scene's detail, of the motion, and of all sensor noise."""
+
+    scene: int = 0
+    motion: int = 0
+    noise: int = 0
+
+
+@dataclass(frozen=True)
+class Scan:
+    """One scan: points (n,) of dtype POINT in the lidar frame; start, end in ns from t = 0."""
+
+    start: int
+    end: int
+    points: np.ndarray
+
+
+def extrinsic() -> np.ndarray:
+    """T_imu_lidar (4, 4) of the simulated rig."""
+    matrix = np.eye(4)
+    matrix[:3, :3] = euler_to_matrix(np.deg2rad([MOUNT_DEG]))[0]
+    matrix[:3, 3] = LEVER_ARM
+    return matrix
+
+
+def simulate(
+    scene: str,
+    out: Path | str,
+    *,
+    sensor: str = "vlp16",
+    seed: int | Seeds = 0,
+    duration: float | None = None,
+    imu: str = "industrial",
+    range_noise: float | None = None,
+    progress: Progress | None = None,
+) -> Sequence:
+    """Simulate a sequence into the directory out: data.bag, gt.tum, sequence.yaml.
+
+    The directory appears in one step at the end; a former sequence there is replaced.
+
+    Args:
+        scene: a key of SCENES.
+        out: directory to make.
+        sensor: a key of SENSORS.
+        seed: one seed for everything, or one each for scene, motion and noise.
+        duration: s, standstill included; None takes the scene's own.
+        imu: a key of IMU_GRADES.
+        range_noise: 1 σ in m; None takes the sensor's own. 0 also turns range quantisation off.
+        progress: called with (scans done, scans in all).
+
+    Raises:
+        ConfigError: a name is unknown or a number out of range.
+        DataError: the directory holds something else, or cannot be written.
+    """
+    spec = _choose("scene", scene, SCENES)
+    lidar: Sensor = _choose("sensor", sensor, SENSORS)
+    grade: ImuGrade = _choose("imu", imu, IMU_GRADES)
+    length = _number("duration", spec.duration if duration is None else duration,
+                     MIN_DURATION, MAX_DURATION)  # fmt: skip
+    sigma = _number("range_noise", lidar.range_noise if range_noise is None else range_noise,
+                    0.0, 10.0)  # fmt: skip
+    seeds = _seeds(seed)
+    world = spec.build(
+        _rng(scene, "scene", seeds.scene), _rng(scene, "motion", seeds.motion), length
+    )
+    sequence = _describe(f"{scene}_{sensor}_s{seeds.noise}", lidar, sensor, grade)
+    scans = scan_world(world, lidar, sigma, _rng(scene, "range", seeds.noise), length)
+    noise = _rng(scene, "imu", seeds.noise)
+
+    def write(directory: Path) -> None:
+        _write_bag(directory / sequence.bag, world.trajectory, grade, noise, scans,
+                   _tell(progress, _scan_count(length)), length)  # fmt: skip
+        _write_truth(directory / str(sequence.ground_truth), world.trajectory, length)
+        sequence.save(directory)
+
+    target = Path(out)
+    _replace_directory(target, write)
+    return Sequence.load(target)
+
+
+def scan_world(
+    world: World, sensor: Sensor, range_noise: float, rng: np.random.Generator, duration: float
+) -> Iterator[Scan]:
+    """All scans of a drive through the world, every ray from the sensor's pose at its own time."""
+    mount = extrinsic()
+    for index in range(_scan_count(duration)):
+        rays = sensor.rays(index)
+        t_ns = rays.t_ns + LEAD_NS
+        origin, direction = _rays_in_world(world.trajectory, rays, t_ns, mount)
+        hits = world.cast(t_ns * 1e-9, origin, direction, sensor.max_range)
+        kept, distance, value = returns.measure(hits, sensor, range_noise, rng)
+        points = np.empty(len(kept), dtype=POINT)
+        for axis, name in enumerate("xyz"):
+            points[name] = rays.directions[kept, axis] * distance
+        points["intensity"] = value
+        points["ring"] = rays.ring[kept]
+        points["time"] = (t_ns[kept] - t_ns[0]) * 1e-9
+        yield Scan(int(t_ns[0]), LEAD_NS + (index + 1) * SCAN_NS, points)
+
+
+def _rays_in_world(
+    trajectory: Trajectory, rays: Rays, t_ns: np.ndarray, mount: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    moments, back = np.unique(t_ns, return_inverse=True)
+    position, rotation = trajectory.pose(moments * 1e-9)
+    lidar_rotation = np.einsum("nij,jk->nik", rotation, mount[:3, :3])
+    lidar_position = position + np.einsum("nij,j->ni", rotation, mount[:3, 3])
+    direction = np.einsum("nij,nj->ni", lidar_rotation[back], rays.directions)
+    return lidar_position[back], direction
+
+
+def _scan_count(duration: float) -> int:
+    return (int(round(duration * 1e9)) - 2 * LEAD_NS) // SCAN_NS
+
+
+def _describe(name: str, lidar: Sensor, model: str, grade: ImuGrade) -> Sequence:
+    return Sequence(
+        name=name,
+        bag="data.bag",
+        ground_truth="gt.tum",
+        T_imu_lidar=[[float(value) for value in row] for row in extrinsic()],
+        lidar=LidarInfo(
+            topic=LIDAR_TOPIC,
+            model=model,
+            rings=lidar.rings,
+            rate_hz=lidar.rate_hz,
+            min_range_m=lidar.min_range,
+            max_range_m=lidar.max_range,
+            time_field="time",
+            time_unit="s",
+        ),
+        imu=ImuInfo(
+            topic=IMU_TOPIC,
+            rate_hz=float(imu_model.RATE_HZ),
+            gyro_noise=grade.gyro_noise,
+            accel_noise=grade.accel_noise,
+            gyro_walk=grade.gyro_walk,
+            accel_walk=grade.accel_walk,
+        ),
+    )
+
+
+def _write_bag(
+    path: Path,
+    trajectory: Trajectory,
+    grade: ImuGrade,
+    rng: np.random.Generator,
+    scans: Iterator[Scan],
+    tell: Callable[[int], None],
+    duration: float,
+) -> None:
+    stamps = imu_model.sample_times(duration)
+    rate, force = imu_model.measure(trajectory, stamps, grade, rng)
+    variance = (
+        grade.gyro_noise**2 * imu_model.RATE_HZ,
+        grade.accel_noise**2 * imu_model.RATE_HZ,
+    )
+    with BagWriter(path, LIDAR_TOPIC, IMU_TOPIC) as bag:
+        sent = 0
+
+        def send_imu(until: int) -> None:
+            nonlocal sent
+            while sent < len(stamps) and stamps[sent] <= until:
+                bag.imu(EPOCH_NS + int(stamps[sent]), rate[sent], force[sent], variance)
+                sent += 1
+
+        for index, scan in enumerate(scans):
+            send_imu(scan.end)
+            bag.cloud(EPOCH_NS + scan.start, EPOCH_NS + scan.end, scan.points)
+            tell(index + 1)
+        send_imu(int(stamps[-1]))
+
+
+def _write_truth(path: Path, trajectory: Trajectory, duration: float) -> None:
+    stamps = imu_model.sample_times(duration)
+    t = stamps * 1e-9
+    position, _ = trajectory.pose(t)
+    rows = np.column_stack([position, trajectory.quaternion(t)])
+    with path.open("w", encoding="ascii", newline="\n") as file:
+        for stamp, row in zip(stamps, rows, strict=True):
+            seconds, rest = divmod(EPOCH_NS + int(stamp), 1_000_000_000)
+            numbers = " ".join(f"{value:.9f}" for value in row)
+            file.write(f"{seconds}.{rest:09d} {numbers}\n")
+
+
+def _tell(progress: Progress | None, total: int) -> Callable[[int], None]:
+    if progress is None:
+        return lambda done: None
+    return lambda done: progress(done, total)
+
+
+def _choose(key: str, name: str, choices: Mapping[str, object]):
+    if name not in choices:
+        raise ConfigError(key, name, "one of " + ", ".join(choices))
+    return choices[name]
+
+
+def _number(key: str, value: float, low: float, high: float) -> float:
+    if not low <= value <= high:  # also refuses NaN
+        raise ConfigError(key, value, f"{low:g} … {high:g}")
+    return float(value)
+
+
+def _seeds(seed: int | Seeds) -> Seeds:
+    seeds = seed if isinstance(seed, Seeds) else Seeds(seed, seed, seed)
+    for key in ("scene", "motion", "noise"):
+        value = getattr(seeds, key)
+        if not isinstance(value, int | np.integer) or value < 0:
+            raise ConfigError(f"seed.{key}", value, "an integer >= 0")
+    return seeds
+
+
+def _rng(scene: str, stream: str, seed: int) -> np.random.Generator:
+    # The motion and noise of one seed should differ between scenes, too.
+    name = zlib.crc32(f"{scene}/{stream}".encode())
+    return np.random.Generator(np.random.PCG64(np.random.SeedSequence([seed, name])))
+
+
+def _replace_directory(target: Path, write: Callable[[Path], None]) -> None:
+    if target.exists() and not _replaceable(target):
+        raise DataError(f"{target}: exists and is not a sequence directory; left as it is")
+    scratch: Path | None = None
+    try:
+        target.parent.mkdir(parents=True, exist_ok=True)
+        scratch = Path(tempfile.mkdtemp(prefix=f".{target.name}.", dir=target.parent))
+        write(scratch)
+        if target.exists():
+            shutil.rmtree(target)
+        scratch.chmod(0o755)
+        os.replace(scratch, target)
+    except OSError as error:
+        reason = "the disk is full" if error.errno == errno.ENOSPC else error.strerror or str(error)
+        raise DataError(f"{target}: cannot be written: {reason}") from error
+    finally:
+        if scratch is not None:
+            shutil.rmtree(scratch, ignore_errors=True)
+
+
+def _replaceable(target: Path) -> bool:
+    return target.is_dir() and ((target / FILE_NAME).is_file() or not any(target.iterdir()))

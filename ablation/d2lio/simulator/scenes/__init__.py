@@ -1,0 +1,31 @@
+# SPDX-FileCopyrightText: 2026 D2-LIO contributors
+# SPDX-License-Identifier: BSD-3-Clause
+"""The scenes, by name."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+from d2lio.simulator.scenes import room, tunnel
+from d2lio.simulator.world import World
+
+Build = Callable[[np.random.Generator, np.random.Generator, float], World]
+
+
+@dataclass(frozen=True)
+class Scene:
+    """A scene: default duration in s, and build(scene rng, motion rng, duration) -> World."""
+
+    description: str
+    duration: float
+    build: Build
+
+
+SCENES: dict[str, Scene] = {
+    "tunnel": Scene("bare straight road tunnel, 60 m driven", 47.0, tunnel.bare),
+    "tunnel_cabinets": Scene("the same with a few cabinets", 47.0, tunnel.cabinets),
+    "room": Scene("furnished room, handheld", 25.0, room.build),
+}
