@@ -1,0 +1,133 @@
+# SPDX-FileCopyrightText: 2026 D2-LIO contributors
+# SPDX-License-Identifier: BSD-3-Clause
+"""Reads IMU and LiDAR topics of a bag."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+from d2lio.datasets.bagfile import Message, Topic, expand, open_bag, topic_list
+from d2lio.datasets.clocks import ClockCheck
+from d2lio.datasets.config import SourceConfig
+from d2lio.datasets.events import NS_PER_S, Notes, RawEvent, RawScan
+from d2lio.datasets.livox import MESSAGE_TYPES as LIVOX_TYPES
+from d2lio.datasets.livox import decode_custom_msg
+from d2lio.datasets.ordering import ImuMessage, gather
+from d2lio.datasets.pointcloud2 import decode_cloud
+from d2lio.errors import DataError
+
+CLOUD_TYPES = ("sensor_msgs/msg/PointCloud2", *LIVOX_TYPES)
+IMU_TYPES = ("sensor_msgs/msg/Imu",)
+STANDARD_GRAVITY = 9.80665  # m/s^2 per g
+
+
+def _stamp(header: Any) -> int:
+    return int(header.stamp.sec) * NS_PER_S + int(header.stamp.nanosec)
+
+
+class BagReader:
+    """ROS 1 bag (or a directory of its shards), ROS 2 bag or MCAP file.
+
+    Opening checks the topics: a wrong name fails at once and lists what is there.
+
+    Raises:
+        DataError: unreadable file, or no such topic.
+    """
+
+    def __init__(self, path: Path, config: SourceConfig) -> None:
+        self._path = path
+        self._config = config
+        self.notes = Notes()
+        self.time_hint = config.time_hint()
+        with open_bag(path) as bag:
+            topics = bag.topics
+        self.lidar_topic = self._choose(topics, config.lidar.topic, CLOUD_TYPES, "lidar")
+        self.imu_topic = self._choose(topics, config.imu.topic, IMU_TYPES, "imu")
+
+    @property
+    def scan_total(self) -> int | None:
+        """Number of scans."""
+        return self.lidar_topic.count
+
+    @property
+    def inputs(self) -> list[str]:
+        """Names of the files read."""
+        return [p.name for p in expand(self._path)]
+
+    def _choose(
+        self, topics: list[Topic], name: str | None, types: tuple[str, ...], what: str
+    ) -> Topic:
+        if name is not None:
+            found = [t for t in topics if t.name == name]
+            problem = f"has no topic {name}"
+            if found and found[0].msgtype not in types:
+                problem = f"topic {name} is a {found[0].msgtype}, not one of {', '.join(types)}"
+                found = []
+        else:
+            found = [t for t in topics if t.msgtype in types and t.count > 0]
+            problem = f"has {len(found)} topics that could be {what}.topic (name one)"
+        if len(found) != 1:
+            raise DataError(f"{self._path}: {problem}; it holds: {topic_list(topics)}")
+        if found[0].count == 0:
+            raise DataError(f"{self._path}: topic {found[0].name} holds no messages")
+        return found[0]
+
+    def raw_events(self) -> Iterator[RawEvent]:
+        """Events in order of reception; see `Reader`."""
+        yield from gather(self._messages(), self.notes)
+
+    def _messages(self) -> Iterator[ImuMessage | RawScan]:
+        check = ClockCheck() if self._config.stamps == "header" else None
+        with open_bag(self._path) as bag:
+            messages = bag.messages([self.lidar_topic.name, self.imu_topic.name])
+            while True:
+                try:
+                    message = next(messages, None)
+                    item = None if message is None else self._decode(message)
+                except DataError:
+                    raise
+                except Exception as err:  # whatever a damaged chunk makes the codecs raise
+                    raise DataError(
+                        f"{self._path}: damaged after {self.notes.counts.get('scans_read', 0)} "
+                        f"scans: {type(err).__name__}: {err}"
+                    ) from None
+                if item is None:
+                    return
+                self._check_clock(check, item)
+                yield item
+
+    def _check_clock(self, check: ClockCheck | None, item: ImuMessage | RawScan) -> None:
+        if check is None:
+            return
+        compare = check.imu if isinstance(item, ImuMessage) else check.scan
+        try:
+            note = compare(item.stamp, item.log_stamp)
+        except DataError as err:
+            raise DataError(f"{self._path}: {err}") from None
+        if note:
+            self.notes.tell(note)
+
+    def _decode(self, message: Message) -> ImuMessage | RawScan:
+        if message.topic == self.imu_topic.name:
+            self.notes.count("imu_read")
+            return self._decode_imu(message)
+        self.notes.count("scans_read")
+        return self._decode_scan(message)
+
+    def _decode_imu(self, message: Message) -> ImuMessage:
+        imu = message.decode()
+        w, f = imu.angular_velocity, imu.linear_acceleration
+        k = STANDARD_GRAVITY if self._config.imu.accel_unit == "g" else 1.0
+        log_times = self._config.stamps == "log"
+        stamp = message.log_stamp if log_times else _stamp(imu.header)
+        return ImuMessage(stamp, message.log_stamp, (w.x, w.y, w.z, k * f.x, k * f.y, k * f.z))
+
+    def _decode_scan(self, message: Message) -> RawScan:
+        if message.msgtype in LIVOX_TYPES:
+            return decode_custom_msg(message.raw, message.log_stamp, cdr=message.cdr)
+        cloud = message.decode()
+        return decode_cloud(
+            cloud, _stamp(cloud.header), message.log_stamp, self._config.lidar.time_field
+        )
