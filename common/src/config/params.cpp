@@ -79,68 +79,73 @@ void ParamTable::push(ParamInfo info, std::function<void(const std::string&)> se
 
 void ParamTable::add(const std::string& key, double& field, Range range, const std::string& unit,
                      const std::string& doc) {
-    push({key, "float", "", format_range(range), unit, doc},
-         [&field, key, range](const std::string& v) { field = parse_number(key, v, range); },
-         [&field] { return format_number(field); });
+    push(
+        {key, "float", "", format_range(range), unit, doc},
+        [&field, key, range](const std::string& v) { field = parse_number(key, v, range); },
+        [&field] { return format_number(field); });
 }
 
 void ParamTable::add(const std::string& key, int& field, Range range, const std::string& unit,
                      const std::string& doc) {
-    push({key, "int", "", format_range(range), unit, doc},
-         [&field, key, range](const std::string& v) {
-             const double x = parse_number(key, v, range);
-             if (x != std::floor(x) || std::abs(x) > 2e9) {
-                 throw ConfigError(key, v, "a whole number, " + format_range(range));
-             }
-             field = static_cast<int>(x);
-         },
-         [&field] { return std::to_string(field); });
+    push(
+        {key, "int", "", format_range(range), unit, doc},
+        [&field, key, range](const std::string& v) {
+            const double x = parse_number(key, v, range);
+            if (x != std::floor(x) || std::abs(x) > 2e9) {
+                throw ConfigError(key, v, "a whole number, " + format_range(range));
+            }
+            field = static_cast<int>(x);
+        },
+        [&field] { return std::to_string(field); });
 }
 
 void ParamTable::add(const std::string& key, bool& field, const std::string& doc) {
-    push({key, "bool", "", "true or false", "", doc},
-         [&field, key](const std::string& v) {
-             std::string s = trim(v);
-             std::transform(s.begin(), s.end(), s.begin(),
-                            [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
-             if (s != "true" && s != "false" && s != "1" && s != "0") {
-                 throw ConfigError(key, v, "true or false");
-             }
-             field = s == "true" || s == "1";
-         },
-         [&field] { return std::string(field ? "true" : "false"); });
+    push(
+        {key, "bool", "", "true or false", "", doc},
+        [&field, key](const std::string& v) {
+            std::string s = trim(v);
+            std::transform(s.begin(), s.end(), s.begin(),
+                           [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
+            if (s != "true" && s != "false" && s != "1" && s != "0") {
+                throw ConfigError(key, v, "true or false");
+            }
+            field = s == "true" || s == "1";
+        },
+        [&field] { return std::string(field ? "true" : "false"); });
 }
 
 void ParamTable::add(const std::string& key, double* field, std::size_t count, Range range,
                      const std::string& unit, const std::string& doc) {
     const std::string shape = std::to_string(count) + " numbers, each " + format_range(range);
-    push({key, "list of " + std::to_string(count), "", format_range(range), unit, doc},
-         [field, count, key, range, shape](const std::string& v) {
-             const auto parts = split_list(v);
-             if (parts.size() != count) throw ConfigError(key, v, shape);
-             std::vector<double> numbers;
-             for (const auto& p : parts) numbers.push_back(parse_number(key, p, range));
-             std::copy(numbers.begin(), numbers.end(), field);
-         },
-         [field, count] {
-             std::string out;
-             for (std::size_t i = 0; i < count; ++i) {
-                 out += (i == 0 ? "" : ", ") + format_number(field[i]);
-             }
-             return "[" + out + "]";
-         });
+    push(
+        {key, "list of " + std::to_string(count), "", format_range(range), unit, doc},
+        [field, count, key, range, shape](const std::string& v) {
+            const auto parts = split_list(v);
+            if (parts.size() != count) throw ConfigError(key, v, shape);
+            std::vector<double> numbers;
+            for (const auto& p : parts) numbers.push_back(parse_number(key, p, range));
+            std::copy(numbers.begin(), numbers.end(), field);
+        },
+        [field, count] {
+            std::string out;
+            for (std::size_t i = 0; i < count; ++i) {
+                out += (i == 0 ? "" : ", ") + format_number(field[i]);
+            }
+            return "[" + out + "]";
+        });
 }
 
 void ParamTable::add_choice(const std::string& key, const std::vector<std::string>& names,
                             std::function<std::size_t()> get, std::function<void(std::size_t)> set,
                             const std::string& doc) {
-    push({key, "choice", "", join(names), "", doc},
-         [key, names, set = std::move(set)](const std::string& v) {
-             const auto it = std::find(names.begin(), names.end(), trim(v));
-             if (it == names.end()) throw ConfigError(key, v, "one of " + join(names));
-             set(static_cast<std::size_t>(it - names.begin()));
-         },
-         [names, get = std::move(get)] { return names.at(get()); });
+    push(
+        {key, "choice", "", join(names), "", doc},
+        [key, names, set = std::move(set)](const std::string& v) {
+            const auto it = std::find(names.begin(), names.end(), trim(v));
+            if (it == names.end()) throw ConfigError(key, v, "one of " + join(names));
+            set(static_cast<std::size_t>(it - names.begin()));
+        },
+        [names, get = std::move(get)] { return names.at(get()); });
 }
 
 const ParamTable::Entry& ParamTable::find(const std::string& key, const std::string& value) const {
