@@ -54,16 +54,29 @@ run_logged() {
     return "$status"
 }
 
+# telling_line LOG: the compiler's or CMake's first complaint (with the line that follows, where
+# CMake puts the reason), else the last error of apt or pip, else the last line.
+telling_line() {
+    awk '
+        first == "" && /: (fatal )?error: / { first = $0 }
+        first == "" && /CMake Error/ { first = $0; if (getline > 0) first = first " " $0 }
+        /^[[:space:]]*(ERROR|E|error|fatal|dpkg: error[^:]*): / { last_error = $0 }
+        NF { last = $0 }
+        END {
+            line = first != "" ? first : last_error != "" ? last_error : last
+            gsub(/[[:space:]]+/, " ", line); sub(/^ /, "", line)
+            print line == "" ? "no output" : line
+        }' "$1"
+}
+
 # die_with_log CODE NAME WHAT: ends with WHAT, the telling line of the log, and where the log is.
 # A full disk is told apart, whatever step met it.
 die_with_log() {
-    local code=$1 log="$LOG_DIR/$2.log" line
+    local code=$1 log="$LOG_DIR/$2.log"
     if grep -qiE 'no space left on device|errno 28|enough free space|disk quota exceeded' "$log"; then
         die "$E_DISK" "$3: the disk is full (log: $log)"
     fi
-    line=$(grep -aE '(^|[^a-z])(ERROR|E|error|fatal|CMake Error[^:]*):? ' "$log" | tail -n 1 || true)
-    [[ -n $line ]] || line=$(grep -av '^[[:space:]]*$' "$log" | tail -n 1 || true)
-    die "$code" "$3: ${line:-no output} (log: $log)"
+    die "$code" "$3: $(telling_line "$log") (log: $log)"
 }
 
 make_dirs() {

@@ -124,7 +124,7 @@ install_package() { # FINGERPRINT
     step 4 'building and installing the d2lio package'
     CMAKE_BUILD_PARALLEL_LEVEL=${D2LIO_JOBS:-$(jobs_default)} \
         run_logged package "$VENV/bin/python" -m pip install --no-input --no-index --no-deps \
-        --no-build-isolation --force-reinstall -C "build-dir=$BUILD/python" "$ROOT" ||
+        --no-build-isolation --force-reinstall "--config-settings=build-dir=$BUILD/python" "$ROOT" ||
         die_with_log "$E_BUILD" package 'building the d2lio package failed'
     write_stamp package "$1"
 }
