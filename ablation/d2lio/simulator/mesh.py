@@ -75,11 +75,14 @@ class Mesh:
         size: tuple[float, float, float],
         material: str,
         yaw: float = 0.0,
+        taper: float = 1.0,
     ) -> None:
-        """Add a box, turned by yaw (rad) about its upright axis."""
+        """Add a box, turned by yaw (rad) about its upright axis, its top scaled by taper."""
         half = 0.5 * np.asarray(size, dtype=float)
         signs = np.array([[x, y, z] for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)])
-        points = _turn(signs * half, yaw) + np.asarray(center, dtype=float)
+        points = signs * half
+        points[signs[:, 2] > 0, :2] *= taper
+        points = _turn(points, yaw) + np.asarray(center, dtype=float)
         quads = [(0, 1, 3, 2), (4, 6, 7, 5), (0, 4, 5, 1), (2, 3, 7, 6), (0, 2, 6, 4), (1, 5, 7, 3)]
         faces = np.array([t for a, b, c, d in quads for t in ((a, b, c), (a, c, d))])
         self.triangles(points[faces], material)
