@@ -1,0 +1,197 @@
+# SPDX-FileCopyrightText: 2026 D2-LIO contributors
+# SPDX-License-Identifier: BSD-3-Clause
+"""A checkout with the real front door in it, and a PATH on which every tool that acts is a fake."""
+
+from __future__ import annotations
+
+import shutil
+import subprocess
+from dataclasses import dataclass, field
+from pathlib import Path
+
+REPOSITORY = Path(__file__).resolve().parents[2]
+TIME_LIMIT_S = 20
+
+# What the front door may take for granted on a bare Debian.
+REAL_TOOLS = [
+    "awk",
+    "basename",
+    "bash",
+    "cat",
+    "cut",
+    "df",
+    "dirname",
+    "env",
+    "find",
+    "flock",
+    "grep",
+    "id",
+    "mkdir",
+    "mv",
+    "nproc",
+    "printf",
+    "readlink",
+    "rm",
+    "sed",
+    "setsid",
+    "sha256sum",
+    "sh",
+    "sleep",
+    "sort",
+    "tail",
+    "touch",
+    "true",
+    "wc",
+    "xargs",
+]
+
+# Each fake writes its call to $CALLS; FAKE_* variables choose how it ends.
+FAKES = {
+    "apt-get": """
+        case "$*" in *install*) ;; *) exit 0 ;; esac
+        if [ "${FAKE_APT:-ok}" != ok ]; then
+            echo 'E: Failed to fetch libtbb-dev  Could not connect'; exit 100
+        fi
+        for word; do echo "$word"; done >>"$INSTALLED"
+    """,
+    "dpkg": "exit 0",
+    "dpkg-query": """
+        while read -r name; do printf '%s ii \\n' "$name"; done <"$INSTALLED"
+    """,
+    "sudo": """
+        [ "${FAKE_SUDO:-ok}" = ok ] || exit 1
+        [ "$1" = -n ] && shift
+        exec "$@"
+    """,
+    "c++": "exit 0",
+    "ninja": "exit 0",
+    "cmake": """
+        if [ "${FAKE_BUILD:-ok}" != ok ]; then
+            echo 'so3.cpp:12:3: error: expected ;'; echo 'ninja: build stopped'; exit 1
+        fi
+    """,
+    "ctest": """
+        while [ $# -gt 0 ]; do [ "$1" = --output-junit ] && junit=$2; shift; done
+        gtest=${GTEST_OUTPUT#xml:}
+        printf '%s' "$FAKE_CTEST" >"$junit"
+        [ -z "$FAKE_GTEST" ] || printf '%s' "$FAKE_GTEST" >"$gtest/test_geometry.xml"
+        exit "${FAKE_CTEST_STATUS:-0}"
+    """,
+    # Stands for /usr/bin/python3 and, copied by `-m venv`, for the environment's own.
+    "python3": """
+        here=${0%/*}
+        case "$*" in
+            *sys.version_info*) [ "${FAKE_VERSION:-new}" = new ] ;;
+            *sys.version*) echo '3.11.2 (fake)' ;;
+            *requirements.py\\ --missing*) [ -e "$here/packages" ] || echo 'numpy>=1.26' ;;
+            *requirements.py*|*summary.py*) exec "$REAL_PYTHON" "$@" ;;
+            *'-m venv'*)
+                mkdir -p "$4/bin"; rm -f "$4"/bin/*; cp "$0" "$4/bin/python" ;;
+            '- '*) [ -e "$here/python" ] ;;
+            *'pip install'*' -r '*)
+                case "${FAKE_PIP:-ok}" in
+                    ok) touch "$here/packages" ;;
+                    download)
+                        echo 'ERROR: No matching distribution found for numpy>=1.26'; exit 1 ;;
+                    full)
+                        echo 'Installing collected packages: numpy'
+                        echo "ERROR: [Errno 28] No space left on device: '/x'"; exit 1 ;;
+                    hang)
+                        echo 'Installing collected packages: numpy'
+                        touch "$here/packages"; echo $$ >"$PIP_PID"; exec sleep 60 ;;
+                esac ;;
+            *'pip install'*)
+                if [ "${FAKE_BUILD:-ok}" != ok ]; then
+                    echo 'so3.cpp:12:3: error: expected ;'
+                    echo 'ERROR: Failed building wheel'
+                    exit 1
+                fi
+                printf '#!/bin/sh\\nprintf "<%%s>" "$PWD" "$@"\\n' >"$here/d2lio"
+                chmod +x "$here/d2lio" ;;
+            *'-m pytest'*)
+                for word; do case "$word" in --junit-xml=*) junit=${word#*=} ;; esac; done
+                [ -z "$FAKE_PYTEST" ] || printf '%s' "$FAKE_PYTEST" >"$junit"
+                exit "${FAKE_PYTEST_STATUS:-0}" ;;
+        esac
+    """,
+}
+
+ALL_PACKAGES = [
+    "build-essential",
+    "cmake",
+    "ninja-build",
+    "libeigen3-dev",
+    "libtbb-dev",
+    "python3-venv",
+    "python3-dev",
+    "libgtest-dev",
+]
+
+
+@dataclass
+class Door:
+    """One checkout and its environment; ``run`` calls its front door as a user would."""
+
+    root: Path
+    bin: Path
+    environment: dict[str, str]
+    cwd: Path = field(init=False)
+
+    def __post_init__(self) -> None:
+        self.cwd = self.root
+
+    def start(self, *arguments: str, **settings: str) -> subprocess.Popen[str]:
+        """Starts ``./d2lio ARGUMENTS`` with extra environment variables."""
+        return subprocess.Popen(
+            [self.root / "d2lio", *arguments],
+            env=self.environment | settings,
+            cwd=self.cwd,
+            stdin=subprocess.DEVNULL,
+            stdout=subprocess.PIPE,
+            stderr=subprocess.PIPE,
+            text=True,
+        )
+
+    def run(self, *arguments: str, **settings: str) -> subprocess.CompletedProcess[str]:
+        """Runs ``./d2lio ARGUMENTS`` to its end."""
+        process = self.start(*arguments, **settings)
+        try:
+            out, err = process.communicate(timeout=TIME_LIMIT_S)
+        finally:
+            process.kill()
+        return subprocess.CompletedProcess(arguments, process.returncode, out, err)
+
+    def calls(self) -> list[str]:
+        """Fakes that changed something since the last look: apt, venv, pip, build."""
+        log = Path(self.environment["CALLS"])
+        seen = []
+        for line in log.read_text().splitlines():
+            if line.startswith("apt-get") and " install " in line:
+                seen.append("apt")
+            elif "-m venv" in line:
+                seen.append("venv")
+            elif "-m pip install" in line:
+                seen.append("build" if "--no-deps" in line else "pip")
+        log.write_text("")
+        return seen
+
+    def install_packages(self, *names: str) -> None:
+        """Makes dpkg-query report these packages (and no others) as installed."""
+        Path(self.environment["INSTALLED"]).write_text("".join(f"{name}\n" for name in names))
+
+    def fake(self, name: str, body: str) -> None:
+        """Puts another fake on the PATH."""
+        (self.bin / name).unlink(missing_ok=True)
+        (self.bin / name).write_text(f"#!/bin/sh\n{body}\n")
+        (self.bin / name).chmod(0o755)
+
+
+def copy_front_door(root: Path) -> None:
+    """The real scripts, and small stand-ins for what they fingerprint."""
+    (root / "tools").mkdir(parents=True)
+    shutil.copy(REPOSITORY / "d2lio", root / "d2lio")
+    shutil.copytree(REPOSITORY / "tools/door", root / "tools/door")
+    shutil.copy(REPOSITORY / "pyproject.toml", root / "pyproject.toml")
+    for name in ("common/src/so3.cpp", "common/tests/test_so3.cpp", "ablation/d2lio/cli.py"):
+        (root / name).parent.mkdir(parents=True, exist_ok=True)
+        (root / name).write_text("one\n")
