@@ -85,6 +85,17 @@ void ParamTable::add(const std::string& key, double& field, Range range, const s
         [&field] { return format_number(field); });
 }
 
+void ParamTable::add(const std::string& key, std::optional<double>& field, Range range,
+                     const std::string& unit, const std::string& doc) {
+    push(
+        {key, "float or auto", "", format_range(range), unit, doc},
+        [&field, key, range](const std::string& v) {
+            field =
+                trim(v) == "auto" ? std::nullopt : std::make_optional(parse_number(key, v, range));
+        },
+        [&field] { return field ? format_number(*field) : std::string("auto"); });
+}
+
 void ParamTable::add(const std::string& key, int& field, Range range, const std::string& unit,
                      const std::string& doc) {
     push(

@@ -4,6 +4,7 @@
 
 #include <functional>
 #include <limits>
+#include <optional>
 #include <stdexcept>
 #include <string>
 #include <vector>
@@ -41,6 +42,9 @@ class ParamTable {
   public:
     void add(const std::string& key, double& field, Range range, const std::string& unit,
              const std::string& doc);
+    /// A number that may be left to the program, written "auto".
+    void add(const std::string& key, std::optional<double>& field, Range range,
+             const std::string& unit, const std::string& doc);
     void add(const std::string& key, int& field, Range range, const std::string& unit,
              const std::string& doc);
     void add(const std::string& key, bool& field, const std::string& doc);

@@ -1,0 +1,59 @@
+// SPDX-FileCopyrightText: 2026 D2-LIO contributors
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <variant>
+
+#include "d2lio/config/params.hpp"
+#include "d2lio/degeneracy/policies.hpp"
+
+namespace d2lio {
+
+enum class DegeneracyMethod { kNone, kPaper, kRemap };
+
+struct DegeneracyConfig {
+    DegeneracyMethod method = DegeneracyMethod::kNone;
+    PaperPrior::Form form = PaperPrior::Form::kCongruence;
+    double w = 30.0;
+    double lambda_min = 1.0;
+    bool inflate_only = true;
+    double threshold_r = 100.0;
+    double threshold_t = 100.0;
+    double weak_share = 0.03;
+
+    /// Binds the keys `degeneracy.*`.
+    void bind(ParamTable& table);
+};
+
+/// The policy chosen by a DegeneracyConfig.
+class DirectionalPrior {
+  public:
+    explicit DirectionalPrior(const DegeneracyConfig& config);
+
+    bool active() const { return !std::holds_alternative<NoPrior>(policy_); }
+    /// @param P_r, P_t covariance blocks of the predicted pose (rad^2, body; m^2, map).
+    PriorTerm evaluate(const Spectrum& spectrum, const Mat3& P_r, const Mat3& P_t) const;
+
+  private:
+    std::variant<NoPrior, PaperPrior, RemapPrior> policy_;
+};
+
+/// Up to six pseudo-measurement rows that carry a prior into a filter or a least squares: their
+/// normal equations are J^T W J with J = blkdiag(J_r^-1(e_r), I).
+struct PriorRows {
+    int count = 0;
+    Eigen::Matrix<double, 6, 3> rotation = Eigen::Matrix<double, 6, 3>::Zero();
+    Eigen::Matrix<double, 6, 3> translation = Eigen::Matrix<double, 6, 3>::Zero();
+    Eigen::Matrix<double, 6, 1> residual =
+        Eigen::Matrix<double, 6, 1>::Zero();  ///< minus the error
+};
+
+/// Rows sqrt(w_i) v_i^T J with residual -sqrt(w_i) v_i^T e, w_i, v_i the eigenpairs of
+/// variance * W. Directions without weight give no row.
+/// @param e_r Log(R_pred^T R), rad; @param e_t t - t_pred, m.
+/// @param variance measurement variance that the other rows carry implicitly (FAST-LIO2: 0.001
+/// m^2).
+PriorRows make_prior_rows(const PriorTerm& prior, const Vec3& e_r, const Vec3& e_t,
+                          double variance);
+
+}  // namespace d2lio

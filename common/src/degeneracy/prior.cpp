@@ -1,0 +1,70 @@
+// SPDX-FileCopyrightText: 2026 D2-LIO contributors
+// SPDX-License-Identifier: BSD-3-Clause
+#include "d2lio/degeneracy/prior.hpp"
+
+#include <cmath>
+
+#include "d2lio/geometry/so3.hpp"
+
+namespace d2lio {
+namespace {
+
+std::variant<NoPrior, PaperPrior, RemapPrior> make_policy(const DegeneracyConfig& c) {
+    switch (c.method) {
+        case DegeneracyMethod::kPaper:
+            return PaperPrior{c.form, c.w, c.lambda_min};
+        case DegeneracyMethod::kRemap:
+            return RemapPrior{c.threshold_r, c.threshold_t};
+        case DegeneracyMethod::kNone:
+            break;
+    }
+    return NoPrior{};
+}
+
+}  // namespace
+
+void DegeneracyConfig::bind(ParamTable& table) {
+    table.add("degeneracy.method", method, {"none", "paper", "remap"},
+              "prior in the degeneracy slot");
+    table.add("degeneracy.form", form, {"congruence", "paper"},
+              "weight of method paper: symmetric congruence or the literal product");
+    table.add("degeneracy.w", w, {0.0, kInf}, "", "strength of method paper");
+    table.add("degeneracy.lambda_min", lambda_min, {1e-9, kInf}, "points or m^2",
+              "eigenvalues are raised to this (method paper)");
+    table.add("degeneracy.inflate_only", inflate_only,
+              "the kept covariance does not claim the prior a second time");
+    table.add("degeneracy.threshold_r", threshold_r, {0.0, kInf}, "m^2",
+              "rotation eigenvalue below which method remap keeps the prediction");
+    table.add("degeneracy.threshold_t", threshold_t, {0.0, kInf}, "points",
+              "translation eigenvalue below which method remap keeps the prediction");
+    table.add("degeneracy.weak_share", weak_share, {0.0, 1.0 / 3.0}, "",
+              "a direction whose eigenvalue is below this share of the trace is reported as weak");
+}
+
+DirectionalPrior::DirectionalPrior(const DegeneracyConfig& config) : policy_(make_policy(config)) {}
+
+PriorTerm DirectionalPrior::evaluate(const Spectrum& spectrum, const Mat3& P_r,
+                                     const Mat3& P_t) const {
+    return std::visit([&](const auto& p) { return p.evaluate(spectrum, P_r, P_t); }, policy_);
+}
+
+PriorRows make_prior_rows(const PriorTerm& prior, const Vec3& e_r, const Vec3& e_t,
+                          double variance) {
+    PriorRows rows;
+    const auto append = [&rows, variance](const Mat3& W, const Mat3& J, const Vec3& e,
+                                          auto& block) {
+        const BlockSpectrum s = decompose(W);
+        for (int i = 0; i < 3; ++i) {
+            const double root = std::sqrt(variance * s.lambda[i]);
+            if (!(root > 0.0) || !std::isfinite(root)) continue;
+            block.row(rows.count) = root * s.v.col(i).transpose() * J;
+            rows.residual[rows.count] = -root * s.v.col(i).dot(e);
+            ++rows.count;
+        }
+    };
+    append(prior.W_r, right_jacobian_inverse_so3(e_r), e_r, rows.rotation);
+    append(prior.W_t, Mat3::Identity(), e_t, rows.translation);
+    return rows;
+}
+
+}  // namespace d2lio
