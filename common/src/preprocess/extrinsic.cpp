@@ -24,7 +24,8 @@ namespace {
 
 Mat3 checked_rotation(const Mat3& R, const std::string& key, double tolerance) {
     if (!R.allFinite()) refuse(R, key, tolerance);
-    const Eigen::JacobiSVD<Mat3> svd(R, Eigen::ComputeFullU | Eigen::ComputeFullV);
+    // Dynamic size: the fixed-size one trips GCC 12's maybe-uninitialized warning.
+    const Eigen::JacobiSVD<Eigen::MatrixXd> svd(R, Eigen::ComputeFullU | Eigen::ComputeFullV);
     const double deviation = (svd.singularValues().array() - 1.0).abs().maxCoeff();
     if (deviation > tolerance || R.determinant() <= 0.0) refuse(R, key, tolerance);
     return svd.matrixU() * svd.matrixV().transpose();

@@ -78,6 +78,25 @@ ImuCheckStatus judge_gravity(double mean, const ImuCheckOptions& options) {
     return plausible ? ImuCheckStatus::kOk : ImuCheckStatus::kImplausible;
 }
 
+ImuCheckStatus judge_saturation(const std::vector<ImuSample>& samples,
+                                const ImuCheckOptions& options, ImuCheck& check) {
+    // Decided on the unit that the readings seem to have.
+    const bool in_g = check.mean_accel_norm < 0.5 * options.gravity;
+    const double min_accel = options.saturation_accel_g * (in_g ? 1.0 : options.gravity);
+    const Saturation worst =
+        worst_saturation(samples, check.samples, options.saturation_gyro, min_accel);
+    check.saturated_value = worst.value;
+    check.saturated_run = worst.run;
+    const bool saturated = worst.run >= std::max<std::size_t>(options.saturation_run, 1);
+    return saturated ? ImuCheckStatus::kSaturated : check.status;
+}
+
+std::string format(const char* pattern, double value, std::size_t count) {
+    char text[256];
+    std::snprintf(text, sizeof text, pattern, value, count);
+    return text;
+}
+
 }  // namespace
 
 ImuCheck check_imu(const std::vector<ImuSample>& samples, const ImuCheckOptions& options) {
@@ -89,67 +108,50 @@ ImuCheck check_imu(const std::vector<ImuSample>& samples, const ImuCheckOptions&
         return check;
     }
     fill_means(samples, check);
-    check.status = judge_gravity(check.mean_accel_norm, options);
     if (check.samples > 1 && all_identical(samples, check.samples)) {
         check.status = ImuCheckStatus::kConstant;
-    }
-    if (check.status == ImuCheckStatus::kConstant || check.status == ImuCheckStatus::kNoGravity) {
         return check;
     }
-    // In g, and wherever saturation itself spoils the mean, the smaller full range decides.
-    const bool in_g = check.mean_accel_norm < 0.5 * options.gravity;
-    const double min_accel = options.saturation_accel_g * (in_g ? 1.0 : options.gravity);
-    const Saturation worst =
-        worst_saturation(samples, check.samples, options.saturation_gyro, min_accel);
-    check.saturated_value = worst.value;
-    check.saturated_run = worst.run;
-    const bool saturated = worst.run >= std::max<std::size_t>(options.saturation_run, 1);
-    if (saturated && check.status != ImuCheckStatus::kInG) {
-        check.status = ImuCheckStatus::kSaturated;
+    check.status = judge_gravity(check.mean_accel_norm, options);
+    // Saturation may itself be what makes the mean implausible.
+    if (check.status == ImuCheckStatus::kOk || check.status == ImuCheckStatus::kImplausible) {
+        check.status = judge_saturation(samples, options, check);
     }
     return check;
 }
 
 std::string to_string(const ImuCheck& check) {
-    char text[256];
     switch (check.status) {
         case ImuCheckStatus::kOk:
-            std::snprintf(text, sizeof text, "IMU plausible: mean |accel| %.3f m/s^2",
-                          check.mean_accel_norm);
-            break;
+            return format("IMU plausible: mean |accel| %.3f m/s^2 over %zu samples",
+                          check.mean_accel_norm, check.samples);
         case ImuCheckStatus::kTooFew:
-            std::snprintf(text, sizeof text, "IMU not checked: only %zu samples", check.samples);
-            break;
+            return "IMU not checked: only " + std::to_string(check.samples) + " samples";
         case ImuCheckStatus::kNotFinite:
             return "IMU readings hold NaN or Inf";
         case ImuCheckStatus::kConstant:
-            std::snprintf(text, sizeof text,
-                          "IMU readings are identical over %zu samples: dead sensor or no noise",
-                          check.samples);
-            break;
+            return "IMU readings are identical over " + std::to_string(check.samples) +
+                   " samples: dead sensor, or simulated without noise";
         case ImuCheckStatus::kNoGravity:
-            std::snprintf(text, sizeof text,
-                          "mean |accel| is %.3f m/s^2, expected about 9.81: gravity was removed or "
-                          "the accelerometer is not connected",
-                          check.mean_accel_norm);
-            break;
+            return format(
+                "mean |accel| is %.3f m/s^2 over %zu samples, expected about 9.81: "
+                "gravity was removed or the accelerometer is not connected",
+                check.mean_accel_norm, check.samples);
         case ImuCheckStatus::kInG:
-            std::snprintf(text, sizeof text,
-                          "mean |accel| is %.3f, expected about 9.81 m/s^2: the unit is g",
-                          check.mean_accel_norm);
-            break;
+            return format(
+                "mean |accel| is %.3f over %zu samples, expected about 9.81 m/s^2: "
+                "the unit is g",
+                check.mean_accel_norm, check.samples);
         case ImuCheckStatus::kImplausible:
-            std::snprintf(text, sizeof text,
-                          "mean |accel| is %.3f m/s^2, expected about 9.81: wrong unit or scale",
-                          check.mean_accel_norm);
-            break;
+            return format(
+                "mean |accel| is %.3f m/s^2 over %zu samples, expected about 9.81: "
+                "wrong unit or scale",
+                check.mean_accel_norm, check.samples);
         case ImuCheckStatus::kSaturated:
-            std::snprintf(text, sizeof text,
-                          "an IMU axis sticks at %.4g for %zu samples in a row: saturated",
+            return format("an IMU axis sticks at %.4g for %zu samples in a row: saturated",
                           check.saturated_value, check.saturated_run);
-            break;
     }
-    return text;
+    return "?";
 }
 
 }  // namespace d2lio

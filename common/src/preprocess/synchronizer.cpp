@@ -53,20 +53,9 @@ Synchronizer::Synchronizer(const SynchronizerOptions& options, const std::string
 }
 
 PushStatus Synchronizer::push_imu(const ImuSample& sample) {
-    if (finished_) return PushStatus::kFinished;
-    if (!usable(sample.stamp) || !sample.gyro.allFinite() || !sample.accel.allFinite()) {
-        ++counts_.imu_bad;
-        return PushStatus::kBadValue;
-    }
-    PushStatus status = PushStatus::kAccepted;
-    if (rewound(sample.stamp, newest_imu_)) {
-        start_epoch();
-        status = PushStatus::kNewEpoch;
-    } else if (newest_imu_ && sample.stamp <= *newest_imu_) {
-        const bool same = sample.stamp == *newest_imu_;
-        ++(same ? counts_.imu_duplicate : counts_.imu_late);
-        return same ? PushStatus::kDuplicateDropped : PushStatus::kLateDropped;
-    }
+    PushStatus status = judge(sample);
+    if (status != PushStatus::kAccepted && status != PushStatus::kNewEpoch) return status;
+    if (status == PushStatus::kNewEpoch) start_epoch();
     if (newest_imu_) {
         ++imu_intervals_;
         const double dt = seconds_between(sample.stamp, *newest_imu_);
@@ -84,27 +73,24 @@ PushStatus Synchronizer::push_imu(const ImuSample& sample) {
     return status;
 }
 
-PushStatus Synchronizer::push_scan(Scan scan) {
+PushStatus Synchronizer::judge(const ImuSample& sample) {
     if (finished_) return PushStatus::kFinished;
-    if (!usable(scan.stamp)) {
-        ++counts_.scans_bad;
+    if (!usable(sample.stamp) || !sample.gyro.allFinite() || !sample.accel.allFinite()) {
+        ++counts_.imu_bad;
         return PushStatus::kBadValue;
     }
-    PushStatus status = PushStatus::kAccepted;
-    if (rewound(scan.stamp, newest_scan_)) {
-        start_epoch();
-        status = PushStatus::kNewEpoch;
-    } else if (newest_scan_ && scan.stamp == *newest_scan_) {
-        ++counts_.scans_duplicate;
-        return PushStatus::kDuplicateDropped;
-    }
+    if (rewound(sample.stamp, newest_imu_)) return PushStatus::kNewEpoch;
+    if (!newest_imu_ || sample.stamp > *newest_imu_) return PushStatus::kAccepted;
+    const bool same = sample.stamp == *newest_imu_;
+    ++(same ? counts_.imu_duplicate : counts_.imu_late);
+    return same ? PushStatus::kDuplicateDropped : PushStatus::kLateDropped;
+}
+
+PushStatus Synchronizer::push_scan(Scan scan) {
     Pending pending;
-    pending.end = scan_end(scan);
-    // A scan inside the previous one would lead the estimate back in time.
-    if (newest_scan_ && (scan.stamp < *newest_scan_ || pending.end <= *newest_end_)) {
-        ++counts_.scans_late;
-        return PushStatus::kLateDropped;
-    }
+    PushStatus status = judge(scan, pending.end);
+    if (status != PushStatus::kAccepted && status != PushStatus::kNewEpoch) return status;
+    if (status == PushStatus::kNewEpoch) start_epoch();
     pending.scan = std::move(scan);
     learn_duration(pending);
     if (options_.max_scans > 0 && scans_.size() >= options_.max_scans) {
@@ -118,6 +104,25 @@ PushStatus Synchronizer::push_scan(Scan scan) {
     scans_.push_back(std::move(pending));
     ++counts_.scans_accepted;
     return status;
+}
+
+PushStatus Synchronizer::judge(const Scan& scan, Stamp& end) {
+    if (finished_) return PushStatus::kFinished;
+    if (!usable(scan.stamp)) {
+        ++counts_.scans_bad;
+        return PushStatus::kBadValue;
+    }
+    end = scan_end(scan);
+    if (rewound(scan.stamp, newest_scan_)) return PushStatus::kNewEpoch;
+    if (!newest_scan_) return PushStatus::kAccepted;
+    if (scan.stamp == *newest_scan_) {
+        ++counts_.scans_duplicate;
+        return PushStatus::kDuplicateDropped;
+    }
+    // A scan that ends inside the previous one would lead the estimate back in time.
+    if (scan.stamp > *newest_scan_ && end > *newest_end_) return PushStatus::kAccepted;
+    ++counts_.scans_late;
+    return PushStatus::kLateDropped;
 }
 
 std::optional<MeasureGroup> Synchronizer::pop() {

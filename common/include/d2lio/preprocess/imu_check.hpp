@@ -43,7 +43,7 @@ struct ImuCheck {
     bool ok() const { return status == ImuCheckStatus::kOk; }
 };
 
-/// Looks at the first `options.samples` samples; the first fault in the order of the enum counts.
+/// Looks at the first `options.samples` samples and names one fault, the one nearest to the cause.
 /// Reports only: scaling is the host's business.
 ImuCheck check_imu(const std::vector<ImuSample>& samples, const ImuCheckOptions& options = {});
 

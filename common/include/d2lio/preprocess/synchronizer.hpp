@@ -97,6 +97,8 @@ class Synchronizer {
         Scan scan;
         Stamp end = 0;
     };
+    PushStatus judge(const ImuSample& sample);
+    PushStatus judge(const Scan& scan, Stamp& end);
     bool rewound(Stamp stamp, const std::optional<Stamp>& newest) const;
     void start_epoch();
     Stamp scan_end(const Scan& scan) const;
