@@ -1,0 +1,151 @@
+// SPDX-FileCopyrightText: 2026 D2-LIO contributors
+// SPDX-License-Identifier: BSD-3-Clause
+#include <algorithm>
+#include <cmath>
+#include <tuple>
+
+#include "d2lio/map/ikd_tree.hpp"
+#include "ikd_traverse.hpp"
+
+namespace d2lio {
+
+using ikd::Entry;
+using ikd::kBucket;
+
+namespace {
+
+struct Query {
+    float x, y, z;
+};
+
+/// Nearer first; the coordinates order equal distances, whatever the shape of the tree.
+inline bool before(const Neighbour& a, const Neighbour& b) {
+    if (a.sq_dist != b.sq_dist) return a.sq_dist < b.sq_dist;
+    return std::tie(a.x, a.y, a.z) < std::tie(b.x, b.y, b.z);
+}
+
+inline float outside(float lo, float hi, float v) {
+    return std::max(std::max(lo - v, v - hi), 0.0F);
+}
+
+inline float box_distance(const Entry& e, const Query& q) {
+    return ikd::squared_norm(outside(e.lo[0], e.hi[0], q.x), outside(e.lo[1], e.hi[1], q.y),
+                             outside(e.lo[2], e.hi[2], q.z));
+}
+
+inline void leaf_distances(const ikd::Leaf& leaf, const Query& q, float* sq_dist) {
+    for (unsigned i = 0; i < kBucket; ++i) {
+        sq_dist[i] = ikd::squared_norm(leaf.c[0][i] - q.x, leaf.c[1][i] - q.y, leaf.c[2][i] - q.z);
+    }
+}
+
+/// Keeps the k best in ascending order.
+class Best {
+  public:
+    Best(Neighbours& out, int k, float max_sq_dist) : out_(out), k_(k), worst_(max_sq_dist) {
+        out_.count = 0;
+    }
+    /// Points and boxes farther than this cannot change the result.
+    float worst() const { return worst_; }
+
+    void offer(const Neighbour& n) {
+        Neighbour* const items = out_.items.data();
+        int i = out_.count;
+        if (i < k_) {
+            ++out_.count;
+        } else if (before(n, items[k_ - 1])) {
+            i = k_ - 1;
+        } else {
+            return;
+        }
+        for (; i > 0 && before(n, items[i - 1]); --i) items[i] = items[i - 1];
+        items[i] = n;
+        if (out_.count == k_) worst_ = items[k_ - 1].sq_dist;
+    }
+
+  private:
+    Neighbours& out_;
+    int k_;
+    float worst_;
+};
+
+inline void scan_leaf(const ikd::Leaf& leaf, std::uint32_t count, const Query& q, Best& best) {
+    alignas(16) std::array<float, kBucket> sq_dist;
+    leaf_distances(leaf, q, sq_dist.data());
+    for (std::uint32_t i = 0; i < count; ++i) {
+        if (sq_dist[i] <= best.worst()) {
+            best.offer({leaf.c[0][i], leaf.c[1][i], leaf.c[2][i], sq_dist[i]});
+        }
+    }
+}
+
+struct Pending {
+    const Entry* entry;
+    float sq_dist;
+};
+
+}  // namespace
+
+void IkdTree::knn(const Eigen::Vector3f& query, int k, float max_sq_dist, Neighbours& out) const {
+    Best best(out, std::clamp(k, 1, Neighbours::kMax), max_sq_dist);
+    if (empty() || !query.allFinite()) return;
+    const Query q{query.x(), query.y(), query.z()};
+    std::array<Pending, ikd::kMaxDepth> stack;
+    std::size_t top = 0;
+    stack[top++] = {&root_, box_distance(root_, q)};
+    while (top > 0) {
+        const Pending next = stack[--top];
+        if (!(next.sq_dist <= best.worst())) continue;
+        const Entry* e = next.entry;
+        while (!e->is_leaf()) {
+            const auto& child = pool_.inner(*e).child;
+            const float d0 = box_distance(child[0], q), d1 = box_distance(child[1], q);
+            const unsigned near = d1 < d0 ? 1 : 0;
+            const float far = std::max(d0, d1);
+            if (far <= best.worst()) stack[top++] = {&child[1 - near], far};
+            e = &child[near];
+        }
+        scan_leaf(pool_.leaf(*e), e->count, q, best);
+    }
+}
+
+std::size_t IkdTree::radius_search(const Eigen::Vector3f& query, float radius,
+                                   std::vector<Neighbour>& out) const {
+    out.clear();
+    if (!query.allFinite() || !(radius >= 0.0F)) return 0;
+    const Query q{query.x(), query.y(), query.z()};
+    const float sq_radius = radius * radius;
+    // Slack of a few roundings: the box only preselects.
+    const float reach = std::nextafter(radius * 1.000001F, Entry::kFar);
+    ikd::Region region{};
+    for (unsigned a = 0; a < 3; ++a) {
+        const float v = query[static_cast<Eigen::Index>(a)];
+        region.lo[a] = std::nextafter(v - reach, -Entry::kFar);
+        region.hi[a] = std::nextafter(v + reach, Entry::kFar);
+    }
+    ikd::for_each_leaf(pool_, root_, region, [&](const ikd::Leaf& leaf, std::uint32_t n) {
+        std::array<float, kBucket> sq_dist;
+        leaf_distances(leaf, q, sq_dist.data());
+        for (std::uint32_t i = 0; i < n; ++i) {
+            if (sq_dist[i] > sq_radius) continue;
+            out.push_back({leaf.c[0][i], leaf.c[1][i], leaf.c[2][i], sq_dist[i]});
+        }
+    });
+    std::sort(out.begin(), out.end(), before);
+    return out.size();
+}
+
+std::size_t IkdTree::box_search(const Box& box, std::vector<Eigen::Vector3f>& out) const {
+    out.clear();
+    const ikd::Region region{{box.min.x(), box.min.y(), box.min.z()},
+                             {box.max.x(), box.max.y(), box.max.z()}};
+    ikd::for_each_leaf(pool_, root_, region, [&](const ikd::Leaf& leaf, std::uint32_t n) {
+        for (std::uint32_t i = 0; i < n; ++i) {
+            const Eigen::Vector3f p = leaf.at(i);
+            if (box.contains(p)) out.push_back(p);
+        }
+    });
+    return out.size();
+}
+
+}  // namespace d2lio
