@@ -1,0 +1,144 @@
+// SPDX-FileCopyrightText: 2026 D2-LIO contributors
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <memory>
+
+/// The only surface a FAST-LIO2 host or a patched upstream touches. C++14, plain pointers only: the
+/// two sides may be built with different standards and Eigen alignments. Matrices are column-major,
+/// rotations 3x3 R_map_imu, lengths in m, angles in rad.
+///
+/// Per scan: begin_scan; in each iteration accept for every point (any thread, any order), then
+/// condition on the stacked rows; end_scan. No member throws or exits, except the constructor on
+/// lack of memory.
+namespace d2lio {
+
+struct ScanDiagnostics;
+
+namespace fastlio {
+
+/// What became of one scan point; every value but kAccepted is a reason for rejection.
+enum class Verdict : std::uint8_t {
+    kAccepted,
+    kFewNeighbours,
+    kFarNeighbours,
+    kThreshold,
+    kSingularPlane,
+    kPlaneFit,
+    kResidual,
+};
+
+struct PoseView {
+    const double* rotation;  ///< 9 numbers
+    const double* position;  ///< 3 numbers
+};
+
+struct ScanInput {
+    PoseView previous;         ///< posterior of the last scan
+    PoseView predicted;        ///< prediction for this one
+    const double* covariance;  ///< of the prediction, size x size
+    int covariance_size;       ///< FAST-LIO2: 23
+    int position_index;        ///< first row of the position block; FAST-LIO2: 0
+    int rotation_index;        ///< first row of the rotation block (right tangent); FAST-LIO2: 3
+    std::size_t points;        ///< scan points to be offered
+};
+
+struct Candidate {
+    std::size_t index;           ///< of the point in its scan
+    bool fresh;                  ///< neighbours come from a new search
+    double imu_range;            ///< distance of the point from the IMU
+    double lidar_range;          ///< distance of the point from the LiDAR
+    const float* p_map;          ///< the point under the current pose, map frame
+    const float* neighbours;     ///< nearest map points, ascending by distance
+    const float* sq_distances;   ///< their squared distances
+    std::size_t neighbour_step;  ///< floats from one neighbour to the next
+    std::size_t distance_step;   ///< floats from one squared distance to the next
+    int neighbour_count;
+};
+
+struct Correspondence {
+    float normal[3];  ///< of the fitted plane, map frame, unit length
+    float residual;   ///< signed point-to-plane distance
+};
+
+/// Stacked rows of the accepted correspondences: entry (r, c) lies at jacobian[r * row_step + c *
+/// column_step]. Columns position..position + 2 and rotation..rotation + 2 hold the pose blocks.
+struct Rows {
+    double* jacobian;
+    double* residual;
+    int count;
+    std::ptrdiff_t row_step, column_step;
+    int position_column, rotation_column;
+};
+
+/// Rows to append to the host's: at most 6. Columns 0-2 position, 3-5 rotation.
+struct PriorBlock {
+    double jacobian[6][6];
+    double residual[6];
+    int count;
+};
+
+enum class Status : std::uint8_t {
+    kOk,
+    kBadInput,  ///< NaN or infinity in a pose or covariance: this scan runs without the plug-in
+    kNoScan,    ///< called outside begin_scan .. end_scan
+    kSingular,  ///< a covariance could not be corrected and was left as it was
+};
+
+struct ParamDoc {
+    const char *key, *type, *default_value, *range, *unit, *doc;
+};
+
+class Adapter {
+  public:
+    Adapter();
+    ~Adapter();
+    Adapter(const Adapter&) = delete;
+    Adapter& operator=(const Adapter&) = delete;
+
+    /// Sets one parameter before the first scan. False for an unknown key or a bad value: see
+    /// error().
+    bool set(const char* key, const char* value);
+    /// Message of the last refused set(): key, value, allowed range. Empty if none.
+    const char* error() const;
+    std::size_t param_count() const;
+    ParamDoc param(std::size_t i) const;
+    /// Voxel size of the host's map (m), used where rejection.epsilon_0 is auto.
+    void set_map_voxel(double size);
+
+    /// True when a rejection mode other than off is set: accept replaces the host's own test.
+    bool rejects() const;
+    /// True when a degeneracy method other than none is set: condition may change or add rows.
+    bool has_prior() const;
+    /// Farthest useful neighbour: beyond this squared distance accept refuses anyway.
+    float max_search_sq_distance() const;
+
+    Status begin_scan(const ScanInput& input);
+    /// Decides on one point; on kAccepted fills `out`. A rejected point stays out until `fresh`.
+    Verdict accept(const Candidate& candidate, Correspondence* out);
+    /// Analyses the rows, projects them where the method asks for it, and returns the rows to
+    /// append.
+    /// @param variance of the rows' measurements (FAST-LIO2: 0.001 m^2).
+    Status condition(const Rows& rows, const PoseView& pose, double variance, PriorBlock* prior);
+    /// @param covariance posterior, corrected in place so that it does not claim the prior's
+    /// information (degeneracy.inflate_only); may be null.
+    Status end_scan(const PoseView& posterior, bool converged, double* covariance, int size);
+    /// Forgets everything learnt from scans; parameters stay.
+    void reset();
+
+    /// Diagnostics of the last ended scan, by column.
+    std::size_t diagnostics_size() const;
+    const char* diagnostics_name(std::size_t i) const;
+    double diagnostics_value(std::size_t i) const;
+    /// The same as a struct, for hosts built together with this library.
+    const ScanDiagnostics& diagnostics() const;
+
+  private:
+    struct Impl;
+    std::unique_ptr<Impl> impl_;
+};
+
+}  // namespace fastlio
+}  // namespace d2lio
