@@ -64,13 +64,12 @@ def decode_custom_msg(raw: bytes, log_stamp: int, *, cdr: bool = False) -> RawSc
     except struct.error as err:
         raise DataError(f"CustomMsg of {len(raw)} bytes is truncated") from err
     dtype = _POINT_CDR if cdr else _POINT
-    if cdr:
-        data = data.ljust(count * dtype.itemsize, b"\0")[: count * dtype.itemsize]
-        short = len(raw) < count * _POINT.itemsize
-    else:
-        short = len(data) < count * dtype.itemsize
-    if short:
+    size = count * dtype.itemsize
+    # CDR pads between the points, not after the last one.
+    if len(data) < size - (1 if cdr and count else 0):
         raise DataError(f"CustomMsg claims {count} points but holds only {len(raw)} bytes")
+    if len(data) < size:
+        data += b"\0"
     points = np.frombuffer(data, dtype, count)
     xyz = np.stack([points["x"], points["y"], points["z"]], axis=1)
     return RawScan(

@@ -13,6 +13,7 @@ from d2lio.datasets.events import NS_PER_S, ImuBlock, Notes, RawEvent, RawScan
 
 JUMP_BACK_S = 1.0  # stamps that fall back further than this begin a new epoch (a looped bag)
 SCANS_HELD = 2  # scans waiting for an earlier-stamped one that arrives late
+IMU_HELD = 8  # the same for IMU samples
 MAX_IMU_BLOCK = 1024  # samples
 
 
@@ -42,7 +43,7 @@ class _Gatherer:
         self._newest_imu = message.stamp
         self._imu.append(message)
         if len(self._imu) >= MAX_IMU_BLOCK:
-            yield from self._flush_imu()
+            yield from self._flush_imu(IMU_HELD)
 
     def add_scan(self, scan: RawScan) -> Iterator[RawEvent]:
         if self._jumped(self._newest_scan, scan.stamp, "scan"):
@@ -51,7 +52,7 @@ class _Gatherer:
         elif self._newest_scan is not None and scan.stamp < self._newest_scan:
             self._notes.count("scans_out_of_order")
         self._newest_scan = max(scan.stamp, self._newest_scan or scan.stamp)
-        yield from self._flush_imu()
+        yield from self._flush_imu(IMU_HELD)
         self._scans.append(scan)
         self._scans.sort(key=lambda s: s.stamp)
         while len(self._scans) > SCANS_HELD:
@@ -70,12 +71,13 @@ class _Gatherer:
         self._notes.tell(f"{what} stamps jump back by {back / NS_PER_S:.1f} s: a new epoch begins")
         return True
 
-    def _flush_imu(self) -> Iterator[RawEvent]:
-        if not self._imu:
-            return
+    def _flush_imu(self, held: int = 0) -> Iterator[RawEvent]:
         # Stable, so that duplicates keep their order of arrival.
         ordered = sorted(self._imu, key=lambda m: m.stamp)
-        self._imu = []
+        ready = len(ordered) - held
+        if ready <= 0:
+            return
+        ordered, self._imu = ordered[:ready], ordered[ready:]
         values = np.array([m.values for m in ordered], np.float64)
         stamps = np.array([m.stamp for m in ordered], np.int64)
         yield ImuBlock(stamps, values[:, :3].copy(), values[:, 3:].copy())
@@ -84,7 +86,7 @@ class _Gatherer:
 def gather(messages: Iterable[ImuMessage | RawScan], notes: Notes) -> Iterator[RawEvent]:
     """Blocks of IMU samples and scans; each scan follows the IMU samples received before it.
 
-    Scans up to SCANS_HELD places late, and IMU samples late within a block, return to their
+    Scans up to SCANS_HELD places late, and IMU samples up to IMU_HELD late, return to their
     place; stamps falling back by more than JUMP_BACK_S end the epoch and are passed on as they
     come. What is later still reaches the host, which drops and counts it.
     """

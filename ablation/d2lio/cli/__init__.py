@@ -1,0 +1,56 @@
+# SPDX-FileCopyrightText: 2026 D2-LIO contributors
+# SPDX-License-Identifier: BSD-3-Clause
+"""The `d2lio` command."""
+
+from __future__ import annotations
+
+import sys
+from typing import Annotated
+
+import typer
+
+from d2lio import __version__
+from d2lio.cli import commands_demo, commands_run
+from d2lio.cli.common import EXIT_BUG, EXIT_CODES, EXIT_INTERRUPTED, crash_report
+
+app = typer.Typer(
+    name="d2lio",
+    help=f"Degeneracy-aware LiDAR-inertial odometry: simulate, run, evaluate.\n\n{EXIT_CODES}",
+    no_args_is_help=True,
+    pretty_exceptions_enable=False,
+    context_settings={"help_option_names": ["-h", "--help"]},
+)
+app.command("run")(commands_run.run)
+app.command("evaluate")(commands_run.evaluate)
+app.command("simulate")(commands_run.simulate)
+app.command("params")(commands_run.params)
+app.command("demo")(commands_demo.demo)
+
+
+def _version(value: bool) -> None:
+    if value:
+        typer.echo(f"d2lio {__version__}")
+        raise typer.Exit
+
+
+@app.callback()
+def _root(
+    version: Annotated[
+        bool, typer.Option("--version", callback=_version, is_eager=True, help="Show the version.")
+    ] = False,
+) -> None:
+    pass
+
+
+def main() -> None:
+    """Entry point; see EXIT_CODES."""
+    try:
+        app()
+    except KeyboardInterrupt:
+        sys.exit(EXIT_INTERRUPTED)
+    except Exception as err:
+        crash_report(err)
+        sys.exit(EXIT_BUG)
+
+
+__all__ = ["app", "main"]

@@ -1,0 +1,293 @@
+# SPDX-FileCopyrightText: 2026 D2-LIO contributors
+# SPDX-License-Identifier: BSD-3-Clause
+"""The four-mode ablation in small: three simulated scenes, ten variants, one table."""
+
+from __future__ import annotations
+
+import csv
+import math
+import os
+import shutil
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, field
+from pathlib import Path
+
+from d2lio.errors import DataError
+from d2lio.hosts import REJECTION_MODES
+from d2lio.jobs import d2lio_command, run_process
+from d2lio.metrics import Curves, Evaluation, evaluate
+from d2lio.record import TRAJECTORY_FILE, RunRecord
+from d2lio.sequence import FILE_NAME, Sequence
+
+FAIL_PERCENT = 5.0  # an ATE beyond this share of the path is shown as `-`, as in the paper
+RUN_TIMEOUT_S = 900.0
+SENSOR = "vlp16"
+RESULTS_FILE = "results.csv"
+REPORT_FILE = "report.html"
+
+Progress = Callable[[str, int, int], None]
+
+
+@dataclass(frozen=True, slots=True)
+class Scene:
+    """A simulated sequence of the demo; duration in s, None for the scene's own."""
+
+    name: str
+    title: str
+    duration: float | None
+    seed: int = 0
+
+    @property
+    def directory(self) -> str:
+        """Name of its directory in the cache; what is in it follows from the name."""
+        length = "" if self.duration is None else f"_{self.duration:g}s"
+        return f"{self.name}_{SENSOR}_s{self.seed}{length}"
+
+
+@dataclass(frozen=True, slots=True)
+class Variant:
+    """A row of the table."""
+
+    rejection: str
+    degeneracy: str
+
+    @property
+    def label(self) -> str:
+        """Name of the row."""
+        return self.rejection + ("" if self.degeneracy == "none" else " + prior")
+
+    @property
+    def directory(self) -> str:
+        """Name of its directory below the scene's."""
+        return f"{self.rejection}_{self.degeneracy}"
+
+
+SCENES = (
+    Scene("offroad", "Off-road", 20.0),
+    Scene("tunnel_cabinets", "Tunnel with cabinets", None),
+    Scene("room", "Room", None),
+)
+VARIANTS = tuple(
+    Variant(rejection, degeneracy)
+    for degeneracy in ("none", "paper")
+    for rejection in REJECTION_MODES
+)
+
+
+@dataclass(slots=True)
+class Row:
+    """One run: where it lies and what came out; the last three are None if it crashed."""
+
+    scene: Scene
+    variant: Variant
+    directory: Path
+    status: str = "ok"  # ok, fail
+    reason: str = ""
+    record: RunRecord | None = None
+    evaluation: Evaluation | None = None
+    curves: Curves | None = None
+
+    @property
+    def ate(self) -> float | None:
+        """ATE RMSE, m."""
+        scored = self.evaluation
+        return scored.ate.rmse if scored is not None and scored.ate is not None else None
+
+    @property
+    def ms_per_scan(self) -> float | None:
+        """Mean time per scan, ms."""
+        total = self.record.time_ms.get("total") if self.record else None
+        return total.mean if total else None
+
+    def fail(self, reason: str) -> None:
+        """Marks the run as failed; the first reason stays."""
+        self.status, self.reason = "fail", self.reason or reason
+
+
+@dataclass(slots=True)
+class DemoResult:
+    """Everything the report needs."""
+
+    out: Path
+    rows: list[Row]
+    scenes: tuple[Scene, ...]
+    variants: tuple[Variant, ...]
+    ground_truths: dict[str, Path] = field(default_factory=dict)
+
+    @property
+    def crashed(self) -> list[Row]:
+        """Runs without a record (crash, refused configuration, time out)."""
+        return [row for row in self.rows if row.record is None]
+
+    def row(self, scene: Scene, variant: Variant) -> Row | None:
+        """The run of a cell."""
+        found = (r for r in self.rows if r.scene == scene and r.variant == variant)
+        return next(found, None)
+
+
+def ensure_sequence(scene: Scene, cache: Path, progress: Progress) -> Path:
+    """The scene's sequence directory, simulated if it is not there yet."""
+    from d2lio.simulator import simulate
+
+    path = cache / scene.directory
+    if not (path / FILE_NAME).is_file():
+        cache.mkdir(parents=True, exist_ok=True)
+        simulate(
+            scene.name,
+            path,
+            sensor=SENSOR,
+            seed=scene.seed,
+            duration=scene.duration,
+            progress=lambda done, total: progress(f"simulating {scene.title}", done, total),
+        )
+    return path
+
+
+def run_demo(
+    out: Path,
+    *,
+    threads: int = 1,
+    scenes: tuple[Scene, ...] = SCENES,
+    variants: tuple[Variant, ...] = VARIANTS,
+    progress: Progress | None = None,
+) -> DemoResult:
+    """Simulates, runs and scores; writes results.csv and report.html into `out`.
+
+    Every run has its own process: a crash or divergence is a row with status fail and its
+    reason, the others go on.
+
+    Raises:
+        DataError: a sequence cannot be simulated or results cannot be written.
+    """
+    from d2lio.report.page import write_report
+
+    tell = progress or (lambda what, done, total: None)
+    out.mkdir(parents=True, exist_ok=True)
+    result = DemoResult(out, [], scenes, variants)
+    sequences = {scene: ensure_sequence(scene, out / "sequences", tell) for scene in scenes}
+    total = len(scenes) * len(variants)
+    for scene, variant in ((s, v) for s in scenes for v in variants):
+        tell(f"{scene.title}: {variant.label}", len(result.rows), total)
+        truth = Sequence.load(sequences[scene]).ground_truth_path
+        if truth is None:
+            raise DataError(f"{sequences[scene]}: has no ground truth")
+        result.ground_truths[scene.name] = truth
+        place = out / "runs" / scene.directory / variant.directory
+        row = Row(scene, variant, place)
+        _run_row(row, sequences[scene], truth, threads)
+        result.rows.append(row)
+        write_csv(out / RESULTS_FILE, result.rows)
+    tell("report", total, total)
+    write_report(result, out / REPORT_FILE)
+    return result
+
+
+def _run_row(row: Row, sequence: Path, truth: Path, threads: int) -> None:
+    row.directory.parent.mkdir(parents=True, exist_ok=True)
+    log = row.directory.with_suffix(".log")
+    command = d2lio_command(
+        "run",
+        str(sequence),
+        "--rejection",
+        row.variant.rejection,
+        "--degeneracy",
+        row.variant.degeneracy,
+        "--threads",
+        str(threads),
+        "--out",
+        str(row.directory),
+    )
+    shutil.rmtree(row.directory, ignore_errors=True)  # never score an earlier run
+    outcome = run_process(command, log, RUN_TIMEOUT_S)
+    if not outcome.ok:
+        row.fail(outcome.reason)
+    if (row.directory / TRAJECTORY_FILE).exists():
+        _score(row, truth)
+    else:
+        row.fail("wrote no trajectory")
+
+
+def _score(row: Row, truth: Path) -> None:
+    row.record = RunRecord.load(row.directory)
+    row.evaluation, row.curves = evaluate(row.directory / TRAJECTORY_FILE, truth)
+    if row.evaluation.status != "ok":
+        row.fail(row.evaluation.reason)
+    percent = row.evaluation.ate_percent
+    if percent is not None and not percent <= FAIL_PERCENT:
+        row.fail(f"ATE {percent:.1f} % of the path, beyond {FAIL_PERCENT:g} %")
+
+
+CSV_COLUMNS = (
+    "scene", "rejection", "degeneracy", "status", "reason", "coverage", "ate_m", "ate_percent",
+    "rpe_10m_m", "first_pose_ate_m", "end_error_m", "accepted_share", "ms_per_scan",
+    "ms_per_scan_p95", "peak_memory_mb", "scans", "path_m", "directory",
+)  # fmt: skip
+
+
+def csv_row(row: Row, base: Path) -> dict[str, object]:
+    """One tidy line; empty cells where a figure does not exist."""
+    scored, record = row.evaluation, row.record
+    total = record.time_ms.get("total") if record else None
+    values: dict[str, object] = {
+        "scene": row.scene.name,
+        "rejection": row.variant.rejection,
+        "degeneracy": row.variant.degeneracy,
+        "status": row.status,
+        "reason": row.reason,
+        "ate_m": row.ate,
+        "ms_per_scan": row.ms_per_scan,
+        "ms_per_scan_p95": total.p95 if total else None,
+        "directory": os.path.relpath(row.directory, base),
+    }
+    if scored:
+        values |= {
+            "coverage": scored.coverage,
+            "ate_percent": scored.ate_percent,
+            "rpe_10m_m": scored.rpe_trans.rmse if scored.rpe_trans else None,
+            "first_pose_ate_m": scored.first_pose_ate,
+            "end_error_m": scored.end_error_m,
+            "path_m": scored.path_m,
+        }
+    if record:
+        values |= {
+            "accepted_share": record.accepted_share,
+            "peak_memory_mb": record.peak_memory_mb,
+            "scans": record.scans.processed,
+        }
+    return {column: values.get(column) for column in CSV_COLUMNS}
+
+
+def write_csv(path: Path, rows: list[Row]) -> None:
+    """Writes results.csv in one go, so that it is whole at any moment."""
+    partial = path.with_name(f".{path.name}.tmp")
+    with partial.open("w", newline="", encoding="utf-8") as stream:
+        writer = csv.DictWriter(stream, CSV_COLUMNS, lineterminator="\n")
+        writer.writeheader()
+        writer.writerows(csv_row(row, path.parent) for row in rows)
+    os.replace(partial, path)
+
+
+def cells(result: DemoResult, variant: Variant) -> Iterator[tuple[str, str, str]]:
+    """Texts (ATE, accepted share, ms per scan) of a table row, scene by scene."""
+    for scene in result.scenes:
+        row = result.row(scene, variant)
+        yield ("-", "-", "-") if row is None else cell(row)
+
+
+def cell(row: Row) -> tuple[str, str, str]:
+    """ATE in metres, `-` with the figure in brackets for a run that failed; share; ms."""
+    share = row.record.accepted_share if row.record else None
+    ms = row.ms_per_scan
+    return (
+        _ate_text(row),
+        "-" if share is None else f"{100 * share:.0f} %",
+        "-" if ms is None or not math.isfinite(ms) else f"{ms:.1f}",
+    )
+
+
+def _ate_text(row: Row) -> str:
+    if row.ate is not None:
+        return f"{row.ate:.3f}" if row.status == "ok" else f"- ({row.ate:.1f})"
+    if row.evaluation is not None:
+        return f"- (cov. {100 * row.evaluation.coverage:.0f} %)"
+    return "FAIL"

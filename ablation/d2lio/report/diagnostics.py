@@ -1,0 +1,45 @@
+# SPDX-FileCopyrightText: 2026 D2-LIO contributors
+# SPDX-License-Identifier: BSD-3-Clause
+"""Columns of diagnostics.csv as arrays."""
+
+from __future__ import annotations
+
+import csv
+from pathlib import Path
+
+import numpy as np
+
+from d2lio.errors import DataError
+
+
+def read_diagnostics(file: Path) -> dict[str, np.ndarray]:
+    """Numeric columns as float64 [N] (empty cells NaN), the others as text [N].
+
+    Raises:
+        DataError: unreadable file or ragged rows.
+    """
+    try:
+        with file.open(newline="", encoding="utf-8") as stream:
+            rows = list(csv.reader(stream))
+    except (OSError, UnicodeDecodeError, csv.Error) as err:
+        raise DataError(f"{file}: cannot be read: {err}") from None
+    if not rows:
+        return {}
+    header, body = rows[0], rows[1:]
+    if any(len(row) != len(header) for row in body):
+        raise DataError(f"{file}: rows of different length")
+    columns = zip(*body, strict=True) if body else ((),) * len(header)
+    return {name: _column(list(column)) for name, column in zip(header, columns, strict=True)}
+
+
+def _column(cells: list[str]) -> np.ndarray:
+    try:
+        return np.array([float(cell) if cell else np.nan for cell in cells], np.float64)
+    except ValueError:
+        return np.array(cells, dtype=str)
+
+
+def seconds_from_start(columns: dict[str, np.ndarray]) -> np.ndarray:
+    """Time of each row since the first, s [N]."""
+    stamps = columns.get("stamp_ns", np.empty(0))
+    return (stamps - stamps[0]) * 1e-9 if len(stamps) else stamps

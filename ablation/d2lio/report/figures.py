@@ -1,0 +1,194 @@
+# SPDX-FileCopyrightText: 2026 D2-LIO contributors
+# SPDX-License-Identifier: BSD-3-Clause
+"""Plotly figures as plain dictionaries, small enough for a phone."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from d2lio.demo import DemoResult, Row, Scene
+from d2lio.report.diagnostics import read_diagnostics, seconds_from_start
+
+MAX_POINTS = 400  # per curve
+COLOURS = {
+    "off": "#888888",
+    "none": "#d1495b",
+    "fixed": "#e58606",
+    "kiss": "#2f7ebc",
+    "point_adaptive": "#2a9d4a",
+}
+TRUTH_COLOUR = "#b8b8b8"
+STAGES = ("preprocess", "deskew", "downsample", "search", "update", "map")
+REASONS = {
+    "rejected_few_neighbours": "few neighbours",
+    "rejected_far_neighbours": "far neighbours",
+    "rejected_threshold": "threshold",
+    "rejected_singular_plane": "singular plane",
+    "rejected_plane_fit": "plane fit",
+    "rejected_residual": "residual",
+}
+
+Figure = dict[str, Any]
+Columns = dict[str, np.ndarray]
+
+
+def thin(values: np.ndarray, digits: int = 5) -> list[float | None]:
+    """At most MAX_POINTS values with `digits` significant digits, None where not finite."""
+    step = max(1, -(-len(values) // MAX_POINTS))
+    return [
+        float(f"{v:.{digits}g}") if np.isfinite(v) else None for v in np.asarray(values)[::step]
+    ]
+
+
+def _curve(name: str, x: np.ndarray, y: np.ndarray, row: Row | None, **extra: Any) -> Figure:
+    line = {"width": 1.6, "color": TRUTH_COLOUR}
+    if row is not None:
+        line["color"] = COLOURS.get(row.variant.rejection, "#7b4fa3")
+        line["dash"] = "solid" if row.variant.degeneracy == "none" else "dash"
+    return {
+        "type": "scatter",
+        "mode": "lines",
+        "name": name,
+        "x": thin(x),
+        "y": thin(y),
+        "line": line,
+        **extra,
+    }
+
+
+def _figure(title: str, x: str, y: str, data: list[Figure], **layout: Any) -> Figure:
+    return {
+        "data": data,
+        "layout": {
+            "title": {"text": title},
+            "xaxis": {"title": {"text": x}},
+            "yaxis": {"title": {"text": y}},
+            **layout,
+        },
+    }
+
+
+def _scored(result: DemoResult, scene: Scene) -> list[Row]:
+    rows = (result.row(scene, variant) for variant in result.variants)
+    return [row for row in rows if row is not None and row.curves is not None]
+
+
+def trajectories(result: DemoResult, scene: Scene) -> list[Figure]:
+    """Top view and side view of every scored run beside the truth."""
+    rows = _scored(result, scene)
+    figures = []
+    for title, axis in (("Top view", 1), ("Side view", 2)):
+        data = []
+        for row in rows:
+            if row.curves is None:
+                continue
+            if not data:
+                truth = row.curves.truth
+                wide = _curve("truth", truth[:, 0], truth[:, axis], None)
+                wide["line"]["width"] = 5
+                data.append(wide)
+            estimate = row.curves.estimate
+            data.append(_curve(row.variant.label, estimate[:, 0], estimate[:, axis], row))
+        figure = _figure(f"{title}, aligned", "x [m]", f"{'xyz'[axis]} [m]", data)
+        if axis == 1:
+            figure["layout"]["yaxis"]["scaleanchor"] = "x"
+        figures.append(figure)
+    return figures
+
+
+def error_over_time(result: DemoResult, scene: Scene) -> Figure:
+    """Translation error after alignment."""
+    data = [
+        _curve(row.variant.label, row.curves.t, row.curves.error, row)
+        for row in _scored(result, scene)
+        if row.curves is not None
+    ]
+    figure = _figure("Translation error", "time [s]", "error [m]", data)
+    figure["layout"]["yaxis"]["type"] = "log"
+    return figure
+
+
+def diagnostics_of(result: DemoResult, scene: Scene) -> list[tuple[Row, Columns]]:
+    """Diagnostics of every run of a scene that left some."""
+    found = []
+    for variant in result.variants:
+        row = result.row(scene, variant)
+        if row is not None and row.record is not None:
+            columns = read_diagnostics(row.directory / "diagnostics.csv")
+            if len(columns.get("stamp_ns", ())):
+                found.append((row, columns))
+    return found
+
+
+def lambda_min(runs: list[tuple[Row, Columns]]) -> list[Figure]:
+    """Smallest eigenvalue of each block over time (the paper's figure)."""
+    figures = []
+    for block, name in (("t", "translation"), ("r", "rotation")):
+        key = f"lambda_{block}_1"
+        data = [
+            _curve(row.variant.label, seconds_from_start(c), c[key], row)
+            for row, c in runs
+            if key in c
+        ]
+        unit = "points" if block == "t" else "points·m²"
+        figure = _figure(f"λ_min, {name} block", "time [s]", f"λ_min [{unit}]", data)
+        figure["layout"]["yaxis"]["type"] = "log"
+        figures.append(figure)
+    return figures
+
+
+def thresholds(runs: list[tuple[Row, Columns]]) -> Figure:
+    """Median acceptance radius ε over time, with its range for the point-adaptive mode."""
+    data: list[Figure] = []
+    for row, columns in runs:
+        if row.variant.rejection not in ("fixed", "kiss", "point_adaptive"):
+            continue
+        if row.variant.degeneracy != "none":
+            continue
+        t = seconds_from_start(columns)
+        data.append(_curve(f"{row.variant.label}, median", t, columns["epsilon_median"], row))
+        if row.variant.rejection == "point_adaptive":
+            low = _curve("min", t, columns["epsilon_min"], row, showlegend=False, opacity=0.4)
+            high = _curve("min to max", t, columns["epsilon_max"], row, fill="tonexty", opacity=0.4)
+            data += [low, high]
+    return _figure("Acceptance radius ε", "time [s]", "ε [m]", data)
+
+
+def rejections(runs: list[tuple[Row, Columns]]) -> Figure:
+    """Share of offered correspondences accepted and rejected, by reason."""
+    names = [row.variant.label for row, _ in runs]
+    data = []
+    for key, label in {"accepted": "accepted", **REASONS}.items():
+        shares = [
+            100.0 * float(np.nansum(c[key])) / max(float(np.nansum(c["offered"])), 1.0)
+            for _, c in runs
+            if key in c
+        ]
+        if len(shares) == len(names) and any(shares):
+            data.append({"type": "bar", "orientation": "h", "name": label, "x": shares, "y": names})
+    return _bars("Correspondences by outcome", "share [%]", data)
+
+
+def timing(runs: list[tuple[Row, Columns]]) -> Figure:
+    """Mean time per scan by stage."""
+    names = [row.variant.label for row, _ in runs]
+    data = []
+    for stage in STAGES:
+        means = [
+            row.record.time_ms[stage].mean
+            for row, _ in runs
+            if row.record is not None and stage in row.record.time_ms
+        ]
+        if len(means) == len(names):
+            data.append({"type": "bar", "orientation": "h", "name": stage, "x": means, "y": names})
+    return _bars("Time per scan by stage", "mean [ms]", data)
+
+
+def _bars(title: str, x: str, data: list[Figure]) -> Figure:
+    for bar in data:
+        bar["x"] = thin(np.asarray(bar["x"]))
+    figure = _figure(title, x, "", data, barmode="stack")
+    figure["layout"]["yaxis"] = {"autorange": "reversed", "automargin": True}
+    return figure

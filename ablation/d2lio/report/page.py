@@ -1,0 +1,113 @@
+# SPDX-FileCopyrightText: 2026 D2-LIO contributors
+# SPDX-License-Identifier: BSD-3-Clause
+"""Puts table and figures into one HTML file that needs nothing else."""
+
+from __future__ import annotations
+
+import json
+import os
+from html import escape
+from importlib.resources import files
+from pathlib import Path
+from typing import Any
+
+from d2lio import __version__
+from d2lio.demo import FAIL_PERCENT, RESULTS_FILE, DemoResult, Scene, cell
+from d2lio.report import figures
+
+
+def _script_json(value: Any) -> str:
+    """JSON that can stand inside a script element."""
+    text = json.dumps(value, ensure_ascii=False, allow_nan=False, separators=(",", ":"))
+    return text.replace("</", "<\\/").replace("<!--", "<\\!--")
+
+
+def _plotly() -> str:
+    from plotly.offline import get_plotlyjs
+
+    return get_plotlyjs().replace("</script", "<\\/script")
+
+
+def _table(result: DemoResult) -> str:
+    head = "".join(f'<th colspan="3">{escape(s.title)}</th>' for s in result.scenes)
+    units = "<th>ATE [m]</th><th>accepted</th><th>ms/scan</th>" * len(result.scenes)
+    lines = [f"<thead><tr><th></th>{head}</tr><tr><th>variant</th>{units}</tr></thead><tbody>"]
+    best = {scene: _best(result, scene) for scene in result.scenes}
+    for variant in result.variants:
+        tds = []
+        for scene in result.scenes:
+            row = result.row(scene, variant)
+            ate, share, ms = ("-", "-", "-") if row is None else cell(row)
+            kind = "best" if row is not None and row is best[scene] else ""
+            if row is not None and row.status != "ok":
+                kind = "fail"
+            why = escape(row.reason, quote=True) if row is not None else ""
+            tds.append(f'<td class="{kind}" title="{why}">{escape(ate)}</td>')
+            tds.append(f'<td class="dim">{share}</td><td class="dim">{ms}</td>')
+        lines.append(f"<tr><th>{escape(variant.label)}</th>{''.join(tds)}</tr>")
+    return "".join(lines) + "</tbody>"
+
+
+def _best(result: DemoResult, scene: Scene) -> Any:
+    rows = (result.row(scene, variant) for variant in result.variants)
+    scored = [r for r in rows if r is not None and r.status == "ok" and r.ate is not None]
+    return min(scored, key=lambda r: r.ate or 0.0, default=None)
+
+
+def _failures(result: DemoResult) -> str:
+    failed = [row for row in result.rows if row.status != "ok"]
+    if not failed:
+        return ""
+    items = "".join(
+        f"<li>{escape(r.scene.title)}, {escape(r.variant.label)}: {escape(r.reason)}</li>"
+        for r in failed
+    )
+    return f"<details><summary>{len(failed)} runs shown as -</summary><ul>{items}</ul></details>"
+
+
+def _files(result: DemoResult) -> str:
+    base = result.out
+    items = "".join(
+        f'<li><a href="{escape(os.path.relpath(r.directory, base), quote=True)}/">'
+        f"{escape(r.scene.title)}, {escape(r.variant.label)}</a></li>"
+        for r in result.rows
+        if r.record is not None
+    )
+    return (
+        f'<details><summary>Files</summary><ul><li><a href="{RESULTS_FILE}">{RESULTS_FILE}</a>'
+        f"</li>{items}</ul></details>"
+    )
+
+
+def _scene(result: DemoResult, scene: Scene) -> dict[str, Any]:
+    runs = figures.diagnostics_of(result, scene)
+    plots = [
+        *figures.trajectories(result, scene),
+        figures.error_over_time(result, scene),
+        *figures.lambda_min(runs),
+        figures.thresholds(runs),
+        figures.rejections(runs),
+        figures.timing(runs),
+    ]
+    return {"id": scene.name, "title": scene.title, "figures": [p for p in plots if p["data"]]}
+
+
+def write_report(result: DemoResult, path: Path) -> None:
+    """Writes the page in one go."""
+    template = files("d2lio.report").joinpath("template.html").read_text(encoding="utf-8")
+    scenes = [_scene(result, scene) for scene in result.scenes]
+    values = {
+        "VERSION": escape(__version__),
+        "FAIL_PERCENT": f"{FAIL_PERCENT:g}",
+        "TABLE": _table(result),
+        "FAILURES": _failures(result),
+        "FILES": _files(result),
+        "SCENES": _script_json(scenes),
+        "PLOTLY": _plotly(),
+    }
+    page = template
+    for name, text in values.items():
+        page = page.replace(f"@@{name}@@", text)
+    partial = path.with_name(f".{path.name}.tmp")
+    partial.write_text(page, encoding="utf-8")
+    os.replace(partial, path)
