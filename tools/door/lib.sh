@@ -55,17 +55,20 @@ run_logged() {
 }
 
 # telling_line LOG: the compiler's or CMake's first complaint (with the line that follows, where
-# CMake puts the reason), else the last error of apt or pip, else the last line.
+# CMake puts the reason), else why pip lost its connection (it then claims that there is no such
+# package), else the last error of apt or pip, else the last line.
 telling_line() {
     awk '
         first == "" && /: (fatal )?error: / { first = $0 }
         first == "" && /CMake Error/ { first = $0; if (getline > 0) first = first " " $0 }
+        match($0, /connection broken by .*/) { connection = substr($0, RSTART, RLENGTH) }
         /^[[:space:]]*(ERROR|E|error|fatal|dpkg: error[^:]*): / { last_error = $0 }
         NF { last = $0 }
         END {
-            line = first != "" ? first : last_error != "" ? last_error : last
+            line = first != "" ? first : connection != "" ? connection :
+                last_error != "" ? last_error : last
             gsub(/[[:space:]]+/, " ", line); sub(/^ /, "", line)
-            print line == "" ? "no output" : line
+            print line == "" ? "no output" : substr(line, 1, 300)
         }' "$1"
 }
 

@@ -32,8 +32,9 @@ or D2LIO_OFFLINE=1 with everything installed"
 missing_packages() {
     command -v dpkg-query >/dev/null || return 0 # another system, with D2LIO_OFFLINE
     local installed package
-    installed=$(dpkg-query -W -f '${Package} ${db:Status-Abbrev}\n' "${SYSTEM_PACKAGES[@]}" 2>/dev/null |
-        awk '$2 == "ii" {print $1}')
+    # dpkg-query fails where it knows one of the names not; what it prints about the others counts.
+    installed=$({ dpkg-query -W -f '${Package} ${db:Status-Abbrev}\n' "${SYSTEM_PACKAGES[@]}" || true; } \
+        2>/dev/null | awk '$2 == "ii" {print $1}')
     for package in "${SYSTEM_PACKAGES[@]}"; do
         grep -qx -- "$package" <<<"$installed" || echo "$package"
     done

@@ -57,6 +57,10 @@ FAKES = {
     "dpkg": "exit 0",
     "dpkg-query": """
         while read -r name; do printf '%s ii \\n' "$name"; done <"$INSTALLED"
+        for word; do # as the real one: fails when a package is unknown
+            case "$word" in -*|*Package*|*Status*) continue ;; esac
+            grep -qx -- "$word" "$INSTALLED" || exit 1
+        done
     """,
     "sudo": """
         [ "${FAKE_SUDO:-ok}" = ok ] || exit 1
@@ -92,6 +96,9 @@ FAKES = {
                 case "${FAKE_PIP:-ok}" in
                     ok) touch "$here/packages" ;;
                     download)
+                        echo 'ERROR: No matching distribution found for numpy>=1.26'; exit 1 ;;
+                    unreachable)
+                        echo "WARNING: Retrying after connection broken by 'ReadTimeoutError(1)'"
                         echo 'ERROR: No matching distribution found for numpy>=1.26'; exit 1 ;;
                     full)
                         echo 'Installing collected packages: numpy'

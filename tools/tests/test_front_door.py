@@ -164,6 +164,12 @@ def test_failed_pip_download_shows_its_line_and_the_next_call_goes_on(door: Door
     assert door.calls() == ["pip", "build"]
 
 
+def test_lost_connection_is_told_rather_than_what_pip_concludes_from_it(door: Door) -> None:
+    done = door.run("setup", FAKE_PIP="unreachable")
+    assert_fails(done, 12, "connection broken by 'ReadTimeoutError")
+    assert "No matching" not in done.stderr
+
+
 def test_failed_build_shows_the_compiler_line(door: Door) -> None:
     done = door.run("setup", FAKE_BUILD="fails")
     assert_fails(done, 15, "so3.cpp:12:3: error: expected ;", "package.log")
