@@ -46,7 +46,15 @@ struct Extremes {
     bool accepts(T value) const {
         return std::isfinite(static_cast<double>(value)) && !(zeros_are_gaps && value == T{0});
     }
+    void add(T value, std::size_t times = 1) {
+        min = usable == 0 ? value : std::min(min, value);
+        max = usable == 0 ? value : std::max(max, value);
+        usable += times;
+    }
     double span() const { return static_cast<double>(max) - static_cast<double>(min); }
+    double distance_from_zero() const {
+        return std::max(static_cast<double>(min), -static_cast<double>(max));
+    }
 };
 
 template <typename T>
@@ -54,24 +62,16 @@ Extremes<T> find_extremes(const T* raw, std::size_t count) {
     Extremes<T> found;
     std::size_t zeros = 0;
     for (std::size_t i = 0; i < count; ++i) {
-        if (!found.accepts(raw[i])) continue;
         if (raw[i] == T{0}) {
             ++zeros;
-            continue;
+        } else if (found.accepts(raw[i])) {
+            found.add(raw[i]);
         }
-        found.min = found.usable == 0 ? raw[i] : std::min(found.min, raw[i]);
-        found.max = found.usable == 0 ? raw[i] : std::max(found.max, raw[i]);
-        ++found.usable;
     }
-    if (zeros == 0) return found;
-    const double nearest =
-        std::max(static_cast<double>(found.min), -static_cast<double>(found.max));
     // Two distinct values are needed: with one there is no span to compare with.
-    found.zeros_are_gaps = found.span() > 0.0 && nearest > kPlaceholderDistance * found.span();
-    if (found.zeros_are_gaps) return found;
-    found.min = found.usable == 0 ? T{0} : std::min(found.min, T{0});
-    found.max = found.usable == 0 ? T{0} : std::max(found.max, T{0});
-    found.usable += zeros;
+    found.zeros_are_gaps = zeros > 0 && found.span() > 0.0 &&
+                           found.distance_from_zero() > kPlaceholderDistance * found.span();
+    if (zeros > 0 && !found.zeros_are_gaps) found.add(T{0}, zeros);
     return found;
 }
 
@@ -107,36 +107,33 @@ PointTimeStatus find_unit(const Extremes<T>& found, const PointTimeHint& hint, T
     return fine ? PointTimeStatus::kOk : PointTimeStatus::kInconsistentSpan;
 }
 
-// Extremes in seconds, enough to tell the conventions apart.
+PointTimeStatus check_absolute(double min_s, double max_s, Stamp header, bool trusted) {
+    if (std::max(-min_s, max_s) > kMaxAbsoluteSeconds) {
+        return PointTimeStatus::kInconsistentReference;
+    }
+    const double apart = std::abs(min_s - static_cast<double>(header) * kNanosecond);
+    const bool mismatch = !trusted && header != 0 && apart > kClockToleranceSeconds;
+    return mismatch ? PointTimeStatus::kClockMismatch : PointTimeStatus::kOk;
+}
+
+// Extremes in seconds, which is enough to tell the conventions apart.
 PointTimeStatus find_reference(double min_s, double max_s, Stamp header, const PointTimeHint& hint,
                                TimeReference& reference) {
     const double reach = kMaxSpanRatio * hint.period_s;
     const bool relative = min_s >= -reach && max_s <= reach;
     reference = hint.reference;
-    switch (hint.reference) {
-        case TimeReference::kStart:
-            return relative && min_s >= -kStartSlack * hint.period_s
-                       ? PointTimeStatus::kOk
-                       : PointTimeStatus::kInconsistentReference;
-        case TimeReference::kEnd:
-            return relative ? PointTimeStatus::kOk : PointTimeStatus::kInconsistentReference;
-        case TimeReference::kAuto:
-            if (relative) {
-                reference = -min_s > max_s ? TimeReference::kEnd : TimeReference::kStart;
-                return PointTimeStatus::kOk;
-            }
-            reference = TimeReference::kAbsolute;
-            break;
-        case TimeReference::kAbsolute:
-            break;
+    if (reference == TimeReference::kAuto) {
+        const bool backwards = -min_s > max_s;
+        reference = !relative   ? TimeReference::kAbsolute
+                    : backwards ? TimeReference::kEnd
+                                : TimeReference::kStart;
     }
-    if (std::max(-min_s, max_s) > kMaxAbsoluteSeconds) {
-        return PointTimeStatus::kInconsistentReference;
+    if (reference == TimeReference::kAbsolute) {
+        return check_absolute(min_s, max_s, header, hint.reference == TimeReference::kAbsolute);
     }
-    const double apart = std::abs(min_s - static_cast<double>(header) * kNanosecond);
-    const bool mismatch =
-        hint.reference == TimeReference::kAuto && header != 0 && apart > kClockToleranceSeconds;
-    return mismatch ? PointTimeStatus::kClockMismatch : PointTimeStatus::kOk;
+    const bool early =
+        hint.reference == TimeReference::kStart && min_s < -kStartSlack * hint.period_s;
+    return relative && !early ? PointTimeStatus::kOk : PointTimeStatus::kInconsistentReference;
 }
 
 Stamp to_nanoseconds(std::int64_t value, TimeUnit unit) { return value * nanoseconds_per(unit); }
