@@ -65,8 +65,10 @@ telling_line() {
         /^[[:space:]]*(ERROR|E|error|fatal|dpkg: error[^:]*): / { last_error = $0 }
         NF { last = $0 }
         END {
-            line = first != "" ? first : connection != "" ? connection :
-                last_error != "" ? last_error : last
+            line = last
+            if (last_error != "") line = last_error
+            if (connection != "") line = connection
+            if (first != "") line = first
             gsub(/[[:space:]]+/, " ", line); sub(/^ /, "", line)
             print line == "" ? "no output" : substr(line, 1, 300)
         }' "$1"
