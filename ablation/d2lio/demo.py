@@ -280,7 +280,7 @@ def cell(row: Row) -> tuple[str, str, str]:
     ms = row.ms_per_scan
     return (
         _ate_text(row),
-        "-" if share is None else f"{100 * share:.0f} %",
+        "-" if share is None else f"{100 * share:.0f}%",
         "-" if ms is None or not math.isfinite(ms) else f"{ms:.1f}",
     )
 
@@ -289,5 +289,5 @@ def _ate_text(row: Row) -> str:
     if row.ate is not None:
         return f"{row.ate:.3f}" if row.status == "ok" else f"- ({row.ate:.1f})"
     if row.evaluation is not None:
-        return f"- (cov. {100 * row.evaluation.coverage:.0f} %)"
+        return f"- (cov. {100 * row.evaluation.coverage:.0f}%)"
     return "FAIL"

@@ -36,9 +36,8 @@ def real_data():
 @pytest.fixture
 def fake_host(monkeypatch: pytest.MonkeyPatch):
     """The host name `fake`, driving FakeHost."""
-    from fakes import FakeHost
-
     from d2lio import hosts
+    from fakes import FakeHost
 
     monkeypatch.setitem(hosts.HOSTS, "fake", lambda: FakeHost)
     return "fake"

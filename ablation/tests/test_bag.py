@@ -9,13 +9,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 from bags import CLOUD, IMU, NS, START, Recorded, drive, imu_message, ros1_store, write_bag
-from rosbags.rosbag2 import StoragePlugin
-from rosbags.rosbag2 import Writer as Writer2
-from rosbags.typesys import Stores, get_typestore
-
 from d2lio.datasets import ImuBlock, RawScan, SourceConfig, open_source
 from d2lio.datasets.bag import BagReader
 from d2lio.errors import ConfigError, DataError
+from rosbags.rosbag2 import StoragePlugin
+from rosbags.rosbag2 import Writer as Writer2
+from rosbags.typesys import Stores, get_typestore
 
 
 def read(path: Path, **config: object) -> tuple[list, BagReader]:
@@ -155,7 +154,7 @@ def test_wrong_topic_lists_what_is_there(tmp_path: Path) -> None:
 
 def test_no_imu_topic(tmp_path: Path) -> None:
     messages = [m for m in drive(2) if m.msgtype == CLOUD]
-    with pytest.raises(DataError, match="0 topics that could be imu.topic"):
+    with pytest.raises(DataError, match=r"0 topics that could be imu.topic"):
         read(write_bag(tmp_path / "a.bag", messages))
 
 
@@ -163,7 +162,7 @@ def test_two_candidates_must_be_named(tmp_path: Path) -> None:
     messages = drive(2)
     messages += [Recorded(m.log, "/right", CLOUD, m.message) for m in messages if m.topic[1] == "l"]
     path = write_bag(tmp_path / "a.bag", sorted(messages, key=lambda m: m.log))
-    with pytest.raises(DataError, match="2 topics that could be lidar.topic"):
+    with pytest.raises(DataError, match=r"2 topics that could be lidar.topic"):
         read(path)
     assert len(scans_of(read(path, lidar={"topic": "/right"})[0])) == 2
 
@@ -208,7 +207,7 @@ def test_damage_in_the_middle_says_how_far_it_came(tmp_path: Path) -> None:
 def test_missing_file(tmp_path: Path) -> None:
     with pytest.raises(DataError, match="no such file"):
         open_source(tmp_path / "none.bag")
-    with pytest.raises(DataError, match="holds no .bag"):
+    with pytest.raises(DataError, match=r"holds no \.bag"):
         open_source(tmp_path)
 
 
@@ -230,7 +229,7 @@ def test_configuration_file(tmp_path: Path) -> None:
 
 def test_real_mcap_with_three_clocks(real_data) -> None:
     path = real_data("pointcloudset_ouster_mcap/test.mcap")
-    with pytest.raises(DataError, match="1622.472 s.*1588075038.630 s.*1592833242.6"):
+    with pytest.raises(DataError, match=r"1622.472 s.*1588075038.630 s.*1592833242.6"):
         read(path)
     events, reader = read(path, stamps="log")
     assert reader.lidar_topic.name == "/os1_cloud_node/points"

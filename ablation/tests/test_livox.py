@@ -7,10 +7,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from bags import CUSTOM_MSG, CUSTOM_POINT, header, ros1_store
-from rosbags.typesys import Stores, get_types_from_msg, get_typestore
-
 from d2lio.datasets.livox import decode_custom_msg
 from d2lio.errors import DataError
+from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 
 STAMP = 1_700_000_000_123_456_789
 TYPE = "livox_ros_driver/msg/CustomMsg"
@@ -50,7 +49,7 @@ def test_points_times_and_lines(cdr: bool, frame: str) -> None:
 def test_truncated_message_is_refused(cdr: bool) -> None:
     store = ros2_store() if cdr else ros1_store()
     raw = (store.serialize_cdr if cdr else store.serialize_ros1)(message(store), TYPE)
-    with pytest.raises(DataError, match="truncated|claims 5 points"):
+    with pytest.raises(DataError, match=r"truncated|claims 5 points"):
         decode_custom_msg(raw[:-19], 0, cdr=cdr)
     with pytest.raises(DataError, match="truncated"):
         decode_custom_msg(raw[:10], 0, cdr=cdr)

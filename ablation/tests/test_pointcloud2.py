@@ -7,7 +7,6 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from bags import VELODYNE, cloud_message, ros1_store, velodyne_points
-
 from d2lio.datasets.pointcloud2 import decode_cloud
 from d2lio.errors import DataError
 

@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
+from rich import box
 from rich.table import Table
 
 from d2lio.cli.common import (
@@ -70,17 +71,23 @@ def _emit(result: DemoResult) -> None:
 def _print(result: DemoResult) -> None:
     from d2lio.demo import FAIL_PERCENT, REPORT_FILE, RESULTS_FILE, cells
 
-    table = Table(title="ATE [m], accepted correspondences, ms per scan")
+    table = Table(
+        title="ATE \\[m], share of accepted correspondences, ms per scan",
+        box=box.SIMPLE_HEAD,
+        pad_edge=False,
+        collapse_padding=True,
+    )
     table.add_column("variant", no_wrap=True)
     for scene in result.scenes:
-        table.add_column(scene.title, justify="right")
-        table.add_column("acc.", justify="right", style="dim")
-        table.add_column("ms", justify="right", style="dim")
-    for index, variant in enumerate(result.variants):
-        texts = [text for three in cells(result, variant) for text in three]
-        last = index + 1 == len(result.variants)
-        section = not last and result.variants[index + 1].degeneracy != variant.degeneracy
-        table.add_row(variant.label, *texts, end_section=section)
+        table.add_column(scene.title, justify="right", no_wrap=True)
+    former = ""
+    for variant in result.variants:
+        if variant.degeneracy != former:
+            title = "no prior" if variant.degeneracy == "none" else f"prior: {variant.degeneracy}"
+            table.add_row(f"[dim]{title}[/]")
+            former = variant.degeneracy
+        texts = [f"{ate} {share:>4} {ms:>4}" for ate, share, ms in cells(result, variant)]
+        table.add_row(f" {variant.rejection}", *texts)
     stdout().print(table)
     failed = [row for row in result.rows if row.status != "ok"]
     for row in failed:

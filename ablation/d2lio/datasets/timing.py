@@ -12,6 +12,10 @@ import numpy as np
 from d2lio.datasets.events import NS_PER_S, Event, Notes, RawEvent, RawScan, Reader, Scan, TimeHint
 from d2lio.errors import DataError
 
+NO_TIMES = (
+    "the cloud has no per-point times; set `lidar.synchronised: true` if it is motion compensated, "
+    "or `lidar.pseudo_times: true` to estimate them from the azimuth"
+)
 BAD_SCANS_IN_A_ROW = 10  # a source whose first scans all fail has a setting wrong
 
 
@@ -51,9 +55,11 @@ class TimeResolver:
     def _ask(self, raw: RawScan) -> dict:
         from d2lio._core import resolve_point_times
 
-        values = raw.times
-        if values is not None:
-            values = values.astype(np.int64 if values.dtype.kind in "iu" else np.float64)
+        if raw.times is None:
+            return {"status": "absent", "message": NO_TIMES}
+        # int64 keeps absolute nanoseconds exact, float64 does not.
+        exact = raw.times.dtype.kind in "iu"
+        values = raw.times.astype(np.int64 if exact else np.float64)
         hint = self._hint
         return resolve_point_times(
             values,
@@ -70,7 +76,7 @@ class TimeResolver:
             return
         self._locked = True
         self._hint = replace(self._hint, unit=found["unit"], reference=found["reference"])
-        self._notes.tell(f"point times: {found['message']}")
+        self._notes.tell(found["message"])
 
     def _refuse(self, raw: RawScan, found: dict) -> Scan | None:
         if self._hint.pseudo and found["status"] in ("absent", "all_equal", "not_finite"):
@@ -79,7 +85,7 @@ class TimeResolver:
             self._failed_at_start += 1
             hopeless = found["status"] in ("absent", "clock_mismatch")
             if hopeless or self._failed_at_start >= BAD_SCANS_IN_A_ROW:
-                raise DataError(f"point times: {found['message']}")
+                raise DataError(found["message"])
         self._notes.count(f"scans_bad_times_{found['status']}")
         return None
 

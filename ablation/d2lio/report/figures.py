@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from d2lio.demo import DemoResult, Row, Scene
+from d2lio.demo import DemoResult, Row, Scene, Variant
 from d2lio.report.diagnostics import read_diagnostics, seconds_from_start
 
 MAX_POINTS = 400  # per curve
@@ -20,7 +20,10 @@ COLOURS = {
     "point_adaptive": "#2a9d4a",
 }
 TRUTH_COLOUR = "#b8b8b8"
+SHOWN = ("off", "point_adaptive", "off + prior", "point_adaptive + prior")  # at first
 STAGES = ("preprocess", "deskew", "downsample", "search", "update", "map")
+OUTCOME_COLOURS = ("#2a9d4a", "#264653", "#5b8ea6", "#d1495b", "#9b5de5", "#e58606", "#e9c46a")
+STAGE_COLOURS = ("#264653", "#2f7ebc", "#7fb7d6", "#e58606", "#d1495b", "#2a9d4a")
 REASONS = {
     "rejected_few_neighbours": "few neighbours",
     "rejected_far_neighbours": "far neighbours",
@@ -34,6 +37,27 @@ Figure = dict[str, Any]
 Columns = dict[str, np.ndarray]
 
 
+def line_style(variant: Variant) -> dict[str, str]:
+    """Colour by rejection mode, dashes for the prior."""
+    return {
+        "color": COLOURS.get(variant.rejection, "#7b4fa3"),
+        "dash": "solid" if variant.degeneracy == "none" else "dash",
+    }
+
+
+def variant_buttons(result: DemoResult) -> list[dict[str, Any]]:
+    """What the page needs to draw one button per variant."""
+    return [
+        {
+            "label": v.label,
+            "colour": line_style(v)["color"],
+            "dashed": v.degeneracy != "none",
+            "shown": v.label in SHOWN,
+        }
+        for v in result.variants
+    ]
+
+
 def thin(values: np.ndarray, digits: int = 5) -> list[float | None]:
     """At most MAX_POINTS values with `digits` significant digits, None where not finite."""
     step = max(1, -(-len(values) // MAX_POINTS))
@@ -45,8 +69,8 @@ def thin(values: np.ndarray, digits: int = 5) -> list[float | None]:
 def _curve(name: str, x: np.ndarray, y: np.ndarray, row: Row | None, **extra: Any) -> Figure:
     line = {"width": 1.6, "color": TRUTH_COLOUR}
     if row is not None:
-        line["color"] = COLOURS.get(row.variant.rejection, "#7b4fa3")
-        line["dash"] = "solid" if row.variant.degeneracy == "none" else "dash"
+        line |= line_style(row.variant)
+        extra["meta"] = row.variant.label
     return {
         "type": "scatter",
         "mode": "lines",
@@ -63,6 +87,7 @@ def _figure(title: str, x: str, y: str, data: list[Figure], **layout: Any) -> Fi
         "data": data,
         "layout": {
             "title": {"text": title},
+            "showlegend": False,
             "xaxis": {"title": {"text": x}},
             "yaxis": {"title": {"text": y}},
             **layout,
@@ -150,8 +175,8 @@ def thresholds(runs: list[tuple[Row, Columns]]) -> Figure:
         t = seconds_from_start(columns)
         data.append(_curve(f"{row.variant.label}, median", t, columns["epsilon_median"], row))
         if row.variant.rejection == "point_adaptive":
-            low = _curve("min", t, columns["epsilon_min"], row, showlegend=False, opacity=0.4)
-            high = _curve("min to max", t, columns["epsilon_max"], row, fill="tonexty", opacity=0.4)
+            low = _curve("min", t, columns["epsilon_min"], row, opacity=0.3)
+            high = _curve("max", t, columns["epsilon_max"], row, fill="tonexty", opacity=0.3)
             data += [low, high]
     return _figure("Acceptance radius ε", "time [s]", "ε [m]", data)
 
@@ -166,9 +191,9 @@ def rejections(runs: list[tuple[Row, Columns]]) -> Figure:
             for _, c in runs
             if key in c
         ]
-        if len(shares) == len(names) and any(shares):
+        if len(shares) == len(names):
             data.append({"type": "bar", "orientation": "h", "name": label, "x": shares, "y": names})
-    return _bars("Correspondences by outcome", "share [%]", data)
+    return _bars("Correspondences by outcome", "share [%]", data, OUTCOME_COLOURS)
 
 
 def timing(runs: list[tuple[Row, Columns]]) -> Figure:
@@ -183,12 +208,14 @@ def timing(runs: list[tuple[Row, Columns]]) -> Figure:
         ]
         if len(means) == len(names):
             data.append({"type": "bar", "orientation": "h", "name": stage, "x": means, "y": names})
-    return _bars("Time per scan by stage", "mean [ms]", data)
+    return _bars("Time per scan by stage", "mean [ms]", data, STAGE_COLOURS)
 
 
-def _bars(title: str, x: str, data: list[Figure]) -> Figure:
-    for bar in data:
+def _bars(title: str, x: str, data: list[Figure], colours: tuple[str, ...]) -> Figure:
+    for index, bar in enumerate(data):
         bar["x"] = thin(np.asarray(bar["x"]))
+        bar["marker"] = {"color": colours[index % len(colours)]}
     figure = _figure(title, x, "", data, barmode="stack")
     figure["layout"]["yaxis"] = {"autorange": "reversed", "automargin": True}
+    figure["layout"]["showlegend"] = True
     return figure

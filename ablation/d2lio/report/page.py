@@ -102,6 +102,7 @@ def write_report(result: DemoResult, path: Path) -> None:
         "TABLE": _table(result),
         "FAILURES": _failures(result),
         "FILES": _files(result),
+        "VARIANTS": _script_json(figures.variant_buttons(result)),
         "SCENES": _script_json(scenes),
         "PLOTLY": _plotly(),
     }
