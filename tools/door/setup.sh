@@ -133,6 +133,8 @@ install_package() { # FINGERPRINT
 use_ccache() {
     if command -v ccache >/dev/null; then
         export CMAKE_CXX_COMPILER_LAUNCHER=ccache
+        # One cache serves every checkout, whatever its path.
+        export CCACHE_BASEDIR=${CCACHE_BASEDIR:-$ROOT} CCACHE_NOHASHDIR=${CCACHE_NOHASHDIR:-1}
     fi
 }
 
