@@ -80,7 +80,8 @@ class BagWriter:
     ) -> None:
         """Write one sample: rate (3,) rad/s, force (3,) m/s², variances of the two."""
         types = self._types
-        vector, quaternion = types["geometry_msgs/msg/Vector3"], types["geometry_msgs/msg/Quaternion"]
+        vector = types["geometry_msgs/msg/Vector3"]
+        quaternion = types["geometry_msgs/msg/Quaternion"]
         unknown = np.zeros(9)
         unknown[0] = -1.0  # sensor_msgs/Imu: no orientation estimate
         message = types["sensor_msgs/msg/Imu"](

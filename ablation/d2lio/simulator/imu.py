@@ -51,7 +51,7 @@ IMU_GRADES: dict[str, ImuGrade] = {
 def sample_times(duration: float) -> np.ndarray:
     """Sample times (n,) int64 ns from the start of the trajectory to its end."""
     period = 1_000_000_000 // RATE_HZ
-    return np.arange(0, int(round(duration * 1e9)) + 1, period, dtype=np.int64)
+    return np.arange(0, round(duration * 1e9) + 1, period, dtype=np.int64)
 
 
 def ideal(trajectory: Trajectory, t: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -88,9 +88,7 @@ def measure(
 ) -> tuple[np.ndarray, np.ndarray]:
     """Measured angular rate rad/s and specific force m/s², both (n, 3), at stamps (n,) ns."""
     rate, force = ideal(trajectory, stamps * 1e-9)
-    gyro = corrupt(
-        rate, grade.gyro_noise, grade.gyro_walk, grade.gyro_bias, grade.gyro_scale, rng
-    )
+    gyro = corrupt(rate, grade.gyro_noise, grade.gyro_walk, grade.gyro_bias, grade.gyro_scale, rng)
     accel = corrupt(
         force, grade.accel_noise, grade.accel_walk, grade.accel_bias, grade.accel_scale, rng
     )

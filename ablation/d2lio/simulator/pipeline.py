@@ -5,18 +5,19 @@
 from __future__ import annotations
 
 import errno
-import os
 import shutil
 import tempfile
 import zlib
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
+from typing import TypeVar
 
 import numpy as np
 
 from d2lio.errors import ConfigError, DataError
-from d2lio.sequence import FILE_NAME, ImuInfo, LidarInfo, Sequence
+from d2lio.sequence import FILE_NAME as SEQUENCE_FILE
+from d2lio.sequence import ImuInfo, LidarInfo, Sequence
 from d2lio.simulator import imu as imu_model
 from d2lio.simulator import returns
 from d2lio.simulator.bag import POINT, BagWriter
@@ -28,6 +29,8 @@ from d2lio.simulator.world import World
 
 EPOCH_NS = 1_700_000_000_123_456_789  # stamp of t = 0
 LEAD_NS = 150_000_000  # the IMU runs this much longer than the lidar, at both ends
+BAG_FILE, TRUTH_FILE = "data.bag", "gt.tum"
+OWN_FILES = {BAG_FILE, TRUTH_FILE, SEQUENCE_FILE}
 LIDAR_TOPIC = "/lidar/points"
 IMU_TOPIC = "/imu/data"
 LEVER_ARM = (0.03, 0.05, 0.08)  # m, lidar origin in the IMU frame
@@ -36,6 +39,7 @@ MIN_DURATION = 2 * LEAD_NS * 1e-9 + 0.2
 MAX_DURATION = 3600.0
 
 Progress = Callable[[int, int], None]
+T = TypeVar("T")
 
 
 @dataclass(frozen=True)
@@ -94,8 +98,8 @@ def simulate(
         DataError: the directory holds something else, or cannot be written.
     """
     spec = _choose("scene", scene, SCENES)
-    lidar: Sensor = _choose("sensor", sensor, SENSORS)
-    grade: ImuGrade = _choose("imu", imu, IMU_GRADES)
+    lidar = _choose("sensor", sensor, SENSORS)
+    grade = _choose("imu", imu, IMU_GRADES)
     length = _number("duration", spec.duration if duration is None else duration,
                      MIN_DURATION, MAX_DURATION)  # fmt: skip
     sigma = _number("range_noise", lidar.range_noise if range_noise is None else range_noise,
@@ -109,9 +113,9 @@ def simulate(
     noise = _rng(scene, "imu", seeds.noise)
 
     def write(directory: Path) -> None:
-        _write_bag(directory / sequence.bag, world.trajectory, grade, noise, scans,
+        _write_bag(directory / BAG_FILE, world.trajectory, grade, noise, scans,
                    _tell(progress, _scan_count(length)), length)  # fmt: skip
-        _write_truth(directory / str(sequence.ground_truth), world.trajectory, length)
+        _write_truth(directory / TRUTH_FILE, world.trajectory, length)
         sequence.save(directory)
 
     target = Path(out)
@@ -122,21 +126,27 @@ def simulate(
 def scan_world(
     world: World, sensor: Sensor, range_noise: float, rng: np.random.Generator, duration: float
 ) -> Iterator[Scan]:
-    """All scans of a drive through the world, every ray from the sensor's pose at its own time."""
-    mount = extrinsic()
+    """All scans of a drive of duration s through the world; range_noise is 1 σ in m."""
     for index in range(_scan_count(duration)):
-        rays = sensor.rays(index)
-        t_ns = rays.t_ns + LEAD_NS
-        origin, direction = _rays_in_world(world.trajectory, rays, t_ns, mount)
-        hits = world.cast(t_ns * 1e-9, origin, direction, sensor.max_range)
-        kept, distance, value = returns.measure(hits, sensor, range_noise, rng)
-        points = np.empty(len(kept), dtype=POINT)
-        for axis, name in enumerate("xyz"):
-            points[name] = rays.directions[kept, axis] * distance
-        points["intensity"] = value
-        points["ring"] = rays.ring[kept]
-        points["time"] = (t_ns[kept] - t_ns[0]) * 1e-9
-        yield Scan(int(t_ns[0]), LEAD_NS + (index + 1) * SCAN_NS, points)
+        yield take_scan(world, sensor, index, range_noise, rng)
+
+
+def take_scan(
+    world: World, sensor: Sensor, index: int, range_noise: float, rng: np.random.Generator
+) -> Scan:
+    """Scan number index, every ray from the sensor's pose at its own firing time."""
+    rays = sensor.rays(index)
+    t_ns = rays.t_ns + LEAD_NS
+    origin, direction = _rays_in_world(world.trajectory, rays, t_ns, extrinsic())
+    hits = world.cast(t_ns * 1e-9, origin, direction, sensor.max_range)
+    kept, distance, value = returns.measure(hits, sensor, range_noise, rng)
+    points = np.empty(len(kept), dtype=POINT)
+    for axis, name in enumerate("xyz"):
+        points[name] = rays.directions[kept, axis] * distance
+    points["intensity"] = value
+    points["ring"] = rays.ring[kept]
+    points["time"] = (t_ns[kept] - t_ns[0]) * 1e-9
+    return Scan(int(t_ns[0]), LEAD_NS + (index + 1) * SCAN_NS, points)
 
 
 def _rays_in_world(
@@ -151,14 +161,14 @@ def _rays_in_world(
 
 
 def _scan_count(duration: float) -> int:
-    return (int(round(duration * 1e9)) - 2 * LEAD_NS) // SCAN_NS
+    return (round(duration * 1e9) - 2 * LEAD_NS) // SCAN_NS
 
 
 def _describe(name: str, lidar: Sensor, model: str, grade: ImuGrade) -> Sequence:
     return Sequence(
         name=name,
-        bag="data.bag",
-        ground_truth="gt.tum",
+        bag=BAG_FILE,
+        ground_truth=TRUTH_FILE,
         T_imu_lidar=[[float(value) for value in row] for row in extrinsic()],
         lidar=LidarInfo(
             topic=LIDAR_TOPIC,
@@ -230,7 +240,7 @@ def _tell(progress: Progress | None, total: int) -> Callable[[int], None]:
     return lambda done: progress(done, total)
 
 
-def _choose(key: str, name: str, choices: Mapping[str, object]):
+def _choose(key: str, name: str, choices: Mapping[str, T]) -> T:
     if name not in choices:
         raise ConfigError(key, name, "one of " + ", ".join(choices))
     return choices[name]
@@ -259,16 +269,14 @@ def _rng(scene: str, stream: str, seed: int) -> np.random.Generator:
 
 def _replace_directory(target: Path, write: Callable[[Path], None]) -> None:
     if target.exists() and not _replaceable(target):
-        raise DataError(f"{target}: exists and is not a sequence directory; left as it is")
+        raise DataError(f"{target}: exists and holds more than a simulated sequence; left as it is")
     scratch: Path | None = None
     try:
         target.parent.mkdir(parents=True, exist_ok=True)
         scratch = Path(tempfile.mkdtemp(prefix=f".{target.name}.", dir=target.parent))
         write(scratch)
-        if target.exists():
-            shutil.rmtree(target)
         scratch.chmod(0o755)
-        os.replace(scratch, target)
+        _swap(scratch, target)
     except OSError as error:
         reason = "the disk is full" if error.errno == errno.ENOSPC else error.strerror or str(error)
         raise DataError(f"{target}: cannot be written: {reason}") from error
@@ -277,5 +285,19 @@ def _replace_directory(target: Path, write: Callable[[Path], None]) -> None:
             shutil.rmtree(scratch, ignore_errors=True)
 
 
+def _swap(scratch: Path, target: Path) -> None:
+    old = scratch.with_name(scratch.name + ".old")
+    if target.exists():
+        target.rename(old)
+    try:
+        scratch.rename(target)
+    except BaseException:
+        if old.exists():
+            old.rename(target)
+        raise
+    shutil.rmtree(old, ignore_errors=True)
+
+
 def _replaceable(target: Path) -> bool:
-    return target.is_dir() and ((target / FILE_NAME).is_file() or not any(target.iterdir()))
+    # A directory with anything beside our own three files, such as results, is never removed.
+    return target.is_dir() and {file.name for file in target.iterdir()} <= OWN_FILES

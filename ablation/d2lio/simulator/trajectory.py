@@ -141,12 +141,8 @@ def _add_ride(
     for target, column, sigma in slow:
         target[:, column] += gain * smooth_noise(t, rng, sigma, ride.band_hz)
     for column in range(3):
-        position[:, column] += gain * smooth_noise(
-            t, rng, ride.vibration_m, ride.vibration_band_hz
-        )
-        angles[:, column] += gain * smooth_noise(
-            t, rng, ride.vibration_rad, ride.vibration_band_hz
-        )
+        position[:, column] += gain * smooth_noise(t, rng, ride.vibration_m, ride.vibration_band_hz)
+        angles[:, column] += gain * smooth_noise(t, rng, ride.vibration_rad, ride.vibration_band_hz)
 
 
 def drive(

@@ -43,11 +43,11 @@ class Body:
         self.normal = normal[solid] / area[solid, None]
         # The tree works in float32: centred, it keeps its resolution far from the world's origin.
         self.center = 0.5 * (corners.min(axis=(0, 1)) + corners.max(axis=(0, 1)))
-        corners = corners - self.center
-        self.radius = float(np.linalg.norm(corners, axis=2).max())
-        self.offset = np.einsum("ni,ni->n", self.normal, corners[:, 0])
+        self.corners = corners - self.center
+        self.radius = float(np.linalg.norm(self.corners, axis=2).max())
+        self.offset = np.einsum("ni,ni->n", self.normal, self.corners[:, 0])
         self._scene = EmbreeScene()
-        self._mesh = TriangleMesh(self._scene, np.ascontiguousarray(corners, dtype=np.float32))
+        self._mesh = TriangleMesh(self._scene, np.ascontiguousarray(self.corners, dtype=np.float32))
 
     def cast(self, origin: np.ndarray, direction: np.ndarray) -> Hits:
         """Nearest hits of rays with origin and unit direction (n, 3) in the body's frame.
@@ -88,8 +88,10 @@ class Mover:
     ) -> tuple[np.ndarray, Hits]:
         """Indices (m,) of the rays that come near, and their hits, each at its own time t (n,)."""
         middle, _ = self.trajectory.pose(np.array([t[0], t[-1]]))
-        slack = self.body.radius + np.linalg.norm(middle[1] - middle[0]) + np.linalg.norm(
-            self.body.center
+        slack = (
+            self.body.radius
+            + np.linalg.norm(middle[1] - middle[0])
+            + np.linalg.norm(self.body.center)
         )
         to_body = middle.mean(axis=0) - origin
         along = np.einsum("ni,ni->n", to_body, direction)
@@ -109,9 +111,7 @@ class World:
     trajectory: Trajectory
     movers: tuple[Mover, ...] = ()
 
-    def cast(
-        self, t: np.ndarray, origin: np.ndarray, direction: np.ndarray, reach: float
-    ) -> Hits:
+    def cast(self, t: np.ndarray, origin: np.ndarray, direction: np.ndarray, reach: float) -> Hits:
         """Nearest hits of rays fired at t (n,) s; origin, unit direction (n, 3) in the world."""
         hits = self.fixed.cast(origin, direction)
         for mover in self.movers:

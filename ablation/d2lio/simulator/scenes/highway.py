@@ -43,7 +43,7 @@ def highway(scene: np.random.Generator, motion: np.random.Generator, duration: f
 
 
 def _guard_rail(mesh: Mesh, road: Road, left: float, s: np.ndarray) -> None:
-    road.strip(mesh, np.array(RAIL_PROFILE) + [left, 0.0], s, "metal")
+    road.strip(mesh, np.array(RAIL_PROFILE) + np.array([left, 0.0]), s, "metal")
     for post in np.arange(s[0], s[-1], 4.0):
         foot, yaw = road.point(post, left - 0.05, 0.35)
         mesh.box(tuple(foot), (0.06, 0.1, 0.75), "metal", yaw)
@@ -59,7 +59,7 @@ def _posts_and_signs(
     while s < end:
         spot, yaw = road.point(s, -14.2, 3.2)
         mesh.box(tuple(spot), (0.06, 1.6, 1.8), "sign", yaw)
-        pole(mesh, spot - [0.0, 0.0, 3.5], 2.8)
+        pole(mesh, spot - np.array([0.0, 0.0, 3.5]), 2.8)
         s += rng.uniform(150.0, 320.0)
     for _ in range(int((end - start) / 45.0)):
         left = rng.choice([-1.0, 1.0]) * rng.uniform(24.0, 65.0)
@@ -69,7 +69,7 @@ def _posts_and_signs(
 
 def _highway_traffic(road: Road, duration: float, rng: np.random.Generator) -> list[Mover]:
     movers = []
-    for lane in (-9.0, -1.9 - 1.0):  # slower on the right, faster on the left
+    for lane in (-9.0, -2.9):  # slower on the right, faster on the left
         pace = 0.85 if lane < -5.0 else 1.1
         for start in (-70.0, 30.0, 130.0, 260.0):
             speed = HIGHWAY_SPEED * pace * rng.uniform(0.97, 1.03)

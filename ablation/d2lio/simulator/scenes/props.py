@@ -66,16 +66,12 @@ class Terrain:
     def height(self, x: np.ndarray, y: np.ndarray) -> np.ndarray:
         """Height in m at x, y (any equal shapes)."""
         total = np.zeros(np.broadcast(x, y).shape)
-        for kx, ky, phase, amplitude in zip(
-            *self._wave, self._phase, self._amplitude, strict=True
-        ):
+        for kx, ky, phase, amplitude in zip(*self._wave, self._phase, self._amplitude, strict=True):
             total += amplitude * np.sin(kx * x + ky * y + phase)
         return total
 
 
-def ground(
-    mesh: Mesh, x: np.ndarray, y: np.ndarray, height: np.ndarray, material: str
-) -> None:
+def ground(mesh: Mesh, x: np.ndarray, y: np.ndarray, height: np.ndarray, material: str) -> None:
     """Add a height field: x (n,), y (m,), height (n, m)."""
     grid = np.stack([*np.meshgrid(x, y, indexing="ij"), height], axis=-1)
     mesh.sheet(grid, material)
@@ -85,22 +81,21 @@ def tree(mesh: Mesh, foot: np.ndarray, rng: np.random.Generator, leaves: int = 4
     """A tree of 4 to 9 m with its foot (3,) on the ground."""
     height = rng.uniform(4.0, 9.0)
     lean = np.array([*rng.normal(0.0, 0.25, 2), height * 0.7])
-    mesh.cylinder(foot - [0.0, 0.0, 0.3], foot + lean, rng.uniform(0.1, 0.28), "wood", 9)
+    mesh.cylinder(foot - np.array([0.0, 0.0, 0.3]), foot + lean, rng.uniform(0.1, 0.28), "wood", 9)
     crown = rng.uniform(0.2, 0.32) * height
-    mesh.leaves(
-        foot + lean, (crown, crown, crown * rng.uniform(0.9, 1.4)), leaves, 0.16, rng
-    )
+    mesh.leaves(foot + lean, (crown, crown, crown * rng.uniform(0.9, 1.4)), leaves, 0.16, rng)
 
 
 def bush(mesh: Mesh, foot: np.ndarray, rng: np.random.Generator, leaves: int = 160) -> None:
     """A bush of about a metre with its foot (3,) on the ground."""
     size = rng.uniform(0.4, 1.1)
-    mesh.leaves(foot + [0.0, 0.0, 0.6 * size], (size, size, 0.8 * size), leaves, 0.1, rng)
+    middle = foot + np.array([0.0, 0.0, 0.6 * size])
+    mesh.leaves(middle, (size, size, 0.8 * size), leaves, 0.1, rng)
 
 
 def pole(mesh: Mesh, foot: np.ndarray, height: float, radius: float = 0.08) -> None:
     """An upright pole."""
-    mesh.cylinder(foot, foot + [0.0, 0.0, height], radius, "metal", 12)
+    mesh.cylinder(foot, foot + np.array([0.0, 0.0, height]), radius, "metal", 12)
 
 
 def car(mesh: Mesh, foot: np.ndarray, yaw: float, rng: np.random.Generator) -> None:
@@ -139,9 +134,7 @@ def moving_car(
     return Mover(Body(mesh), Trajectory(t, road.at(s, left), angles, duration))
 
 
-def pedestrian(
-    road: Road, start: float, left: float, speed: float, duration: float
-) -> Mover:
+def pedestrian(road: Road, start: float, left: float, speed: float, duration: float) -> Mover:
     """A walking person, coarsely: legs, trunk and head."""
     mesh = Mesh()
     mesh.box((0.0, 0.0, 0.42), (0.24, 0.32, 0.84), "rubber")

@@ -85,9 +85,7 @@ def _table(mesh: Mesh, x: float, y: float, rng: np.random.Generator) -> None:
             lx = x + dx * np.cos(yaw) - dy * np.sin(yaw)
             ly = y + dx * np.sin(yaw) + dy * np.cos(yaw)
             mesh.cylinder([lx, ly, 0.0], [lx, ly, 0.72], 0.025, "metal", 8)
-    mesh.box(
-        (x + rng.uniform(-0.3, 0.3), y, 0.95), (0.5, 0.05, 0.35), "rubber", rng.uniform(-1, 1)
-    )
+    mesh.box((x + rng.uniform(-0.3, 0.3), y, 0.95), (0.5, 0.05, 0.35), "rubber", rng.uniform(-1, 1))
 
 
 def _chairs(mesh: Mesh, rng: np.random.Generator) -> None:
