@@ -2,7 +2,9 @@
 
 # d2lio_own(<target>): our warning flags (as errors) and, where asked for, sanitizers.
 function(d2lio_own target)
-  target_compile_options(${target} PRIVATE -Wall -Wextra -Wconversion -Werror)
+  # GCC sees uninitialised values in Eigen's fixed-size temporaries where there are none.
+  target_compile_options(${target} PRIVATE -Wall -Wextra -Wconversion -Werror
+                         -Wno-maybe-uninitialized)
   if(D2LIO_SANITIZE)
     target_compile_options(${target} PUBLIC -fsanitize=${D2LIO_SANITIZE}
                            -fno-sanitize-recover=all -fno-omit-frame-pointer)
@@ -55,4 +57,16 @@ function(d2lio_headers_alone name library include_dir)
   if(ARGC GREATER 3)
     set_target_properties(${name} PROPERTIES CXX_STANDARD ${ARGV3})
   endif()
+endfunction()
+
+# d2lio_python_module(<name> <library> <sources...>): a nanobind module inside the package d2lio, with
+# its typed stub. NB_DOMAIN lets the modules share types and exceptions.
+function(d2lio_python_module name library)
+  nanobind_add_module(${name} STABLE_ABI NB_STATIC NB_DOMAIN d2lio ${ARGN})
+  target_link_libraries(${name} PRIVATE ${library})
+  target_compile_options(${name} PRIVATE -Wall -Wextra -Wno-maybe-uninitialized)
+  install(TARGETS ${name} LIBRARY DESTINATION d2lio)
+  nanobind_add_stub(${name}_stub MODULE ${name} OUTPUT ${CMAKE_CURRENT_BINARY_DIR}/${name}.pyi
+                    PYTHON_PATH $<TARGET_FILE_DIR:${name}> DEPENDS ${name})
+  install(FILES ${CMAKE_CURRENT_BINARY_DIR}/${name}.pyi DESTINATION d2lio)
 endfunction()

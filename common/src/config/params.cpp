@@ -168,6 +168,11 @@ const ParamTable::Entry& ParamTable::find(const std::string& key, const std::str
     throw ConfigError(key, value, "known keys: " + join(keys));
 }
 
+bool ParamTable::has(const std::string& key) const {
+    return std::any_of(entries_.begin(), entries_.end(),
+                       [&](const Entry& e) { return e.info.key == key; });
+}
+
 void ParamTable::set(const std::string& key, const std::string& value) {
     find(key, value).set(value);
 }

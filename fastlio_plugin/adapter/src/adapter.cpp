@@ -3,6 +3,8 @@
 #include "d2lio/fastlio/adapter.hpp"
 
 #include <Eigen/Cholesky>
+#include <cmath>
+#include <limits>
 #include <string>
 
 #include "d2lio/degeneracy/prior.hpp"
@@ -89,7 +91,9 @@ void Adapter::Impl::keep_corrections(const Pose& posterior) {
     const Vec3 dr = log_so3(predicted.R.transpose() * posterior.R);
     const Vec3 dt = posterior.t - predicted.t;
     const auto part = [](const Mat3& v, int count, const Vec3& d) {
-        return (v.leftCols(count).transpose() * d).norm();
+        double sum = 0.0;
+        for (int i = 0; i < count; ++i) sum += std::pow(v.col(i).dot(d), 2);
+        return std::sqrt(sum);
     };
     current.correction_r = dr.norm();
     current.correction_t = dt.norm();

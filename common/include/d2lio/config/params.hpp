@@ -62,6 +62,7 @@ class ParamTable {
 
     /// Sets one key from text. @throws ConfigError for an unknown key or a value outside its range.
     void set(const std::string& key, const std::string& value);
+    bool has(const std::string& key) const;
     /// Current value of a key as text. @throws ConfigError for an unknown key.
     std::string get(const std::string& key) const;
     /// Every key with its type, current value, range, unit and text, in order of binding.

@@ -1,0 +1,57 @@
+// SPDX-FileCopyrightText: 2026 D2-LIO contributors
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <memory>
+#include <optional>
+#include <vector>
+
+#include "d2lio/fastlio/config.hpp"
+#include "d2lio/fastlio/result.hpp"
+#include "d2lio/types.hpp"
+
+namespace d2lio::fastlio {
+
+/// Everything the host refused or lost, by reason.
+struct HostCounts {
+    SyncCounts sync;
+    FilterCounts points;
+    std::size_t resets = 0;  ///< epochs begun for an IMU gap beyond the bound
+};
+
+/// LiDAR-inertial odometry that behaves like FAST-LIO2: iterated Kalman filter, point-to-plane on
+/// an ikd-tree. Feed samples and scans in any interleaving, call step() until it has nothing more.
+/// Deterministic whatever the thread count. Not thread-safe.
+class Host {
+  public:
+    /// @param params keys as HostConfig and Adapter bind them.
+    /// @throws ConfigError naming key, value and allowed range, for unknown keys too.
+    explicit Host(const ParamMap& params, int threads = 1);
+    ~Host();
+    Host(Host&&) noexcept;
+    Host& operator=(Host&&) noexcept;
+
+    /// Every parameter with default, range, unit and meaning.
+    static std::vector<ParamInfo> describe();
+
+    PushStatus add_imu(const ImuSample& sample);
+    /// @param scan points in the LiDAR frame, offsets relative to its stamp.
+    PushStatus add_scan(Scan scan);
+    /// No more data will come: what is still complete becomes available to step().
+    void finish();
+    /// Processes the next scan whose inertial data is complete; nothing if there is none.
+    std::optional<ScanResult> step();
+
+    std::vector<Eigen::Vector3f> map_points() const;  ///< map frame, m
+    HostCounts counts() const;
+    SyncReport sync_report() const;  ///< whether data flow, and if not, why
+    std::size_t map_bytes() const;
+    /// Full error-state covariance of the last scan.
+    const Mat23x23& covariance() const;
+
+  private:
+    class Impl;
+    std::unique_ptr<Impl> impl_;
+};
+
+}  // namespace d2lio::fastlio
