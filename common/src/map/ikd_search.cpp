@@ -2,6 +2,8 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include <algorithm>
 #include <cmath>
+#include <cstddef>
+#include <cstring>
 #include <tuple>
 
 #include "d2lio/map/ikd_tree.hpp"
@@ -14,9 +16,11 @@ using ikd::kBucket;
 
 namespace {
 
-struct Query {
-    float x, y, z;
-};
+/// Coordinates in a vector register. The fourth lane is idle; 1 keeps it away from denormals, which
+/// some processors multiply slowly.
+using Query = Eigen::Array4f;
+
+Query query_of(const Eigen::Vector3f& p) { return {p.x(), p.y(), p.z(), 1.F}; }
 
 /// Nearer first; the coordinates order equal distances, whatever the shape of the tree.
 inline bool before(const Neighbour& a, const Neighbour& b) {
@@ -24,18 +28,25 @@ inline bool before(const Neighbour& a, const Neighbour& b) {
     return std::tie(a.x, a.y, a.z) < std::tie(b.x, b.y, b.z);
 }
 
-inline float outside(float lo, float hi, float v) {
-    return std::max(std::max(lo - v, v - hi), 0.0F);
+/// One corner of a box, with whatever follows it in the Entry in the idle lane.
+inline Eigen::Array4f corner(const Entry& e, std::size_t offset) {
+    static_assert(offsetof(Entry, lo) == 0 && offsetof(Entry, hi) == 16 && sizeof(Entry) == 32,
+                  "a corner is the first three of four lanes");
+    Eigen::Array4f lanes;
+    std::memcpy(lanes.data(), reinterpret_cast<const unsigned char*>(&e) + offset, sizeof(lanes));
+    return lanes;
 }
 
 inline float box_distance(const Entry& e, const Query& q) {
-    return ikd::squared_norm(outside(e.lo[0], e.hi[0], q.x), outside(e.lo[1], e.hi[1], q.y),
-                             outside(e.lo[2], e.hi[2], q.z));
+    const Eigen::Array4f beyond = (corner(e, 0) - q).max(q - corner(e, 16)).max(0.F);
+    const Eigen::Array4f sq = beyond * beyond;
+    return (sq[0] + sq[1]) + sq[2];  // the order of squared_norm
 }
 
 inline void leaf_distances(const ikd::Leaf& leaf, const Query& q, float* sq_dist) {
     for (unsigned i = 0; i < kBucket; ++i) {
-        sq_dist[i] = ikd::squared_norm(leaf.c[0][i] - q.x, leaf.c[1][i] - q.y, leaf.c[2][i] - q.z);
+        sq_dist[i] =
+            ikd::squared_norm(leaf.c[0][i] - q[0], leaf.c[1][i] - q[1], leaf.c[2][i] - q[2]);
     }
 }
 
@@ -89,7 +100,7 @@ struct Pending {
 void IkdTree::knn(const Eigen::Vector3f& query, int k, float max_sq_dist, Neighbours& out) const {
     Best best(out, std::clamp(k, 1, Neighbours::kMax), max_sq_dist);
     if (empty() || !query.allFinite()) return;
-    const Query q{query.x(), query.y(), query.z()};
+    const Query q = query_of(query);
     std::array<Pending, ikd::kMaxDepth> stack;
     std::size_t top = 0;
     stack[top++] = {&root_, box_distance(root_, q)};
@@ -113,7 +124,7 @@ std::size_t IkdTree::radius_search(const Eigen::Vector3f& query, float radius,
                                    std::vector<Neighbour>& out) const {
     out.clear();
     if (!query.allFinite() || !(radius >= 0.0F)) return 0;
-    const Query q{query.x(), query.y(), query.z()};
+    const Query q = query_of(query);
     const float sq_radius = radius * radius;
     // Slack of a few roundings: the box only preselects.
     const float reach = std::nextafter(radius * 1.000001F, Entry::kFar);
