@@ -202,7 +202,6 @@ void Synchronizer::drop_uncovered() {
 
 void Synchronizer::take_samples(MeasureGroup& group) {
     Stamp previous = last_used_imu_.value_or(group.begin);
-    if (!last_used_imu_ && !imu_.empty()) previous = std::min(previous, imu_.front().stamp);
     Stamp longest = 0;
     while (!imu_.empty() && imu_.front().stamp <= group.end) {
         const ImuSample& sample = imu_.front();

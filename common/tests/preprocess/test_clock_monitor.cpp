@@ -66,6 +66,26 @@ TEST(ClockMonitor, AStepOfOneClockDuringTheRunIsNamed) {
     EXPECT_EQ(sync.report().health, SyncHealth::kNoOverlap);
 }
 
+TEST(ClockMonitor, AShortImuLossIsNoClockFault) {
+    Synchronizer sync;
+    play(sync, kStart, kStart, 5 * kSecond, kIgnore);
+    Stamp now = kStart + 5 * kSecond;
+    sync.push_scan(scan_at(now));
+    sync.push_imu(imu_at(now + 500 * kMs));
+    drain(sync, kIgnore);
+    EXPECT_EQ(sync.report().health, SyncHealth::kOk);
+}
+
+TEST(ClockMonitor, ATrailingScanIsNoFault) {
+    Synchronizer sync;
+    play(sync, kStart, kStart, kSecond, kIgnore);
+    sync.push_scan(scan_at(kStart + kSecond));
+    sync.finish();
+    drain(sync, kIgnore);
+    EXPECT_EQ(sync.counts().scans_uncovered, 1U);
+    EXPECT_EQ(sync.report().health, SyncHealth::kOk);
+}
+
 TEST(ClockMonitor, AMissingStreamIsNamed) {
     Synchronizer no_imu, no_lidar;
     for (int i = 0; i < 30; ++i) no_imu.push_scan(scan_at(kStart + i * kScanPeriod));

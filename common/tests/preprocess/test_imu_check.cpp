@@ -82,11 +82,20 @@ TEST(ImuCheck, SaturatedAxis) {
     EXPECT_EQ(check_imu(samples).status, ImuCheckStatus::kSaturated);
 }
 
-TEST(ImuCheck, QuantisedReadingsAtRestAreNotSaturation) {
+TEST(ImuCheck, SinglePeaksAreNotSaturation) {
     std::vector<ImuSample> samples = at_rest();
-    for (ImuSample& sample : samples) {
-        sample.gyro = (sample.gyro * 50.0).array().round() / 50.0;
-        sample.accel = (sample.accel * 5.0).array().round() / 5.0;
+    for (std::size_t i = 10; i < 90; i += 8) samples[i].gyro.x() = 4.5;
+    const ImuCheck check = check_imu(samples);
+    EXPECT_TRUE(check.ok());
+    EXPECT_EQ(check.saturated_run, 1U);
+}
+
+TEST(ImuCheck, QuantisedReadingsAtRestAreNotSaturation) {
+    std::vector<ImuSample> samples(kSamples);
+    for (std::size_t i = 0; i < kSamples; ++i) {
+        const double step = i / 8 % 2 == 0 ? 0.0 : 1.0;  // runs of eight at either value
+        samples[i].gyro.x() = 0.01 * step;
+        samples[i].accel.z() = 9.7 + 0.2 * step;
     }
     EXPECT_TRUE(check_imu(samples).ok()) << to_string(check_imu(samples));
 }

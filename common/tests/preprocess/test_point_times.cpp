@@ -251,6 +251,27 @@ TEST(PointTimes, ExtremeIntegersAreRefusedWithoutOverflow) {
     EXPECT_EQ(resolve(far, hint).status, PointTimeStatus::kInconsistentReference);
 }
 
+TEST(PointTimes, OffsetsThatDoNotFit32BitsAreRefused) {
+    PointTimeHint hint;
+    hint.period_s = 2.0;
+    EXPECT_TRUE(resolve(ramp(0.0, 2.0), hint).ok());
+    EXPECT_EQ(resolve(ramp(0.0, 2.2), hint).status, PointTimeStatus::kInconsistentSpan);
+}
+
+// Extremes of the column times of real OS1-64 and OS0-128 sweeps, sensor clock since power-up.
+TEST(PointTimes, OusterSensorClock) {
+    std::vector<std::int64_t> raw(kPoints);
+    for (std::size_t i = 0; i < kPoints; ++i) {
+        raw[i] = 278'211'490'950 + 99'863'760 * static_cast<std::int64_t>(i) / 999;
+    }
+    EXPECT_EQ(resolve(raw).status, PointTimeStatus::kClockMismatch);
+    const PointTimes times = resolve(raw, {}, 278'211'000'000);
+    ASSERT_TRUE(times.ok());
+    EXPECT_EQ(times.unit, TimeUnit::kNanoseconds);
+    EXPECT_EQ(times.scan_stamp, 278'211'490'950);
+    EXPECT_EQ(times.dt_ns.back(), 99'863'760);
+}
+
 TEST(PointTimes, AnImpossiblePeriodIsRefusedAtStart) {
     for (const double period : {0.0, -0.1, 2.5, kNaN}) {
         PointTimeHint hint;

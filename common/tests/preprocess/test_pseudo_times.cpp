@@ -83,6 +83,16 @@ TEST(PseudoTimes, BeamsThatLeadTheFirstReturnStartBeforeIt) {
     EXPECT_NEAR(dt[0], 1e9 * kPeriod * kLead / (2.0 * kPi), kToleranceNs);
 }
 
+TEST(PseudoTimes, JitterAtTheStartIsNotAFullTurn) {
+    constexpr double kJitter = 0.01;  // rad
+    std::vector<LidarPoint> points{at(1.0, 0), at(1.0 - kJitter, 0)};
+    for (int c = 2; c < kColumns; ++c) points.push_back(at(true_azimuth(c, 1), 0));
+    std::vector<std::int32_t> dt;
+    ASSERT_TRUE(pseudo_times_by_azimuth(points, kPeriod, dt));
+    EXPECT_EQ(dt[1], 0);
+    EXPECT_NEAR(dt[0], 1e9 * kPeriod * kJitter / (2.0 * kPi), kToleranceNs);
+}
+
 TEST(PseudoTimes, NoDirectionNoTimes) {
     std::vector<std::int32_t> dt{1, 2, 3};
     EXPECT_FALSE(pseudo_times_by_azimuth({}, kPeriod, dt));

@@ -117,6 +117,30 @@ TEST(Synchronizer, LastInMessageFallsBackToTheMeanDuration) {
     for (std::size_t i = 0; i < 5; ++i) EXPECT_EQ(groups[i].end - groups[i].begin, expected[i]);
 }
 
+TEST(Synchronizer, OnlyMeasuredDurationsEnterTheMean) {
+    SynchronizerOptions options;
+    options.end_rule = ScanEndRule::kLastInMessage;
+    Synchronizer sync(options);
+    sync.push_scan(scan_at(kStart, 100 * kMs));
+    sync.push_scan(scan_at(kStart + kSecond, 40 * kMs));  // taken as 100 ms, but not measured
+    sync.push_scan(scan_at(kStart + 2 * kSecond, 160 * kMs));
+    sync.push_scan({kStart + 3 * kSecond, {}});
+    sync.push_imu(imu_at(kStart + 10 * kSecond));
+    const auto groups = take_all(sync);
+    EXPECT_EQ(groups.back().end - groups.back().begin, 130 * kMs);
+}
+
+TEST(Synchronizer, APartialScanDoesNotShortenTheMean) {
+    Synchronizer sync;
+    sync.push_scan(scan_at(kStart, 100 * kMs));
+    sync.push_scan(scan_at(kStart + kSecond, 20 * kMs));
+    sync.push_scan({kStart + 2 * kSecond, {}});
+    sync.push_imu(imu_at(kStart + 10 * kSecond));
+    const auto groups = take_all(sync);
+    EXPECT_EQ(groups[1].end - groups[1].begin, 20 * kMs);
+    EXPECT_EQ(groups[2].end - groups[2].begin, 100 * kMs);
+}
+
 TEST(Synchronizer, EmptyAndTinyScansPassThrough) {
     Synchronizer sync;
     sync.push_scan(scan_at(kStart, 100 * kMs));

@@ -80,6 +80,19 @@ TEST_P(Rewind, ABagLoopStartsOneNewEpochForBothStreams) {
 
 INSTANTIATE_TEST_SUITE_P(SynchronizerFaults, Rewind, testing::Bool());
 
+TEST(SynchronizerFaults, ANewEpochForgetsTheOldOne) {
+    Synchronizer sync;
+    play(sync, kStart, kStart, kSecond, kIgnore);
+    for (int i = 10; i < 40; ++i) sync.push_scan(scan_at(kStart + i * kScanPeriod));
+    EXPECT_EQ(sync.report().health, SyncHealth::kNoImu);
+    EXPECT_EQ(sync.push_scan(scan_at(kStart)), PushStatus::kNewEpoch);
+    EXPECT_EQ(sync.report().health, SyncHealth::kOk);
+    for (Stamp t = 60 * kMs; t <= 100 * kMs; t += kImuPeriod) sync.push_imu(imu_at(kStart + t));
+    const auto group = sync.pop();
+    ASSERT_TRUE(group);
+    EXPECT_NEAR(group->imu_gap_s, 0.06, kExact);  // from the scan's begin, not from the old loop
+}
+
 TEST(SynchronizerFaults, AStragglerOfTheOldLoopDoesNotBlockTheNewOne) {
     Synchronizer sync;
     play(sync, kStart, kStart, 2 * kSecond, kIgnore);
