@@ -23,6 +23,7 @@ class ScanResult(Protocol):
         stamp: end of the scan, ns.
         status: what the estimator did with it.
         health: INIT, OK, DEGENERATE or LOST.
+        has_pose: false while the estimator initialises.
         T_map_imu: float64 [4, 4], m, at `stamp`.
         velocity, gyro_bias, accel_bias, gravity: float64 [3], SI units, map and body frame.
         covariance: float64 [6, 6], order x y z rx ry rz.
@@ -32,6 +33,7 @@ class ScanResult(Protocol):
     stamp: int
     status: str
     health: str
+    has_pose: bool
     T_map_imu: np.ndarray
     diagnostics: dict[str, float | int | str]
 

@@ -111,7 +111,9 @@ class ResultWriter:
     def add_row(self, diagnostics: dict[str, float | int | str]) -> None:
         """Appends a row of diagnostics only (a scan that gave no pose)."""
         if self._csv is None:
-            self._csv = csv.DictWriter(self._csv_file, list(diagnostics), lineterminator="\n")
+            self._csv = csv.DictWriter(
+                self._csv_file, list(diagnostics), extrasaction="ignore", lineterminator="\n"
+            )
             self._csv.writeheader()
         self._csv.writerow(diagnostics)
 

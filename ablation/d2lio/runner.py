@@ -24,7 +24,6 @@ from d2lio.output import OutputDir, ResultWriter
 from d2lio.record import RunRecord, ScanCounts, StageTime
 
 DIVERGED_M = 1e5  # no sequence of ours leads that far from its start
-NO_POSE = ("INIT",)  # health values without a usable pose
 
 Progress = Callable[[int, int | None], None]
 
@@ -65,6 +64,7 @@ class _Tally:
 
     health: Counter[str] = field(default_factory=Counter)
     status: Counter[str] = field(default_factory=Counter)
+    without_pose: Counter[str] = field(default_factory=Counter)
     times: dict[str, list[float]] = field(default_factory=dict)
     offered: int = 0
     accepted: int = 0
@@ -88,7 +88,8 @@ class _Tally:
         for key, value in row.items():
             if key.startswith("time_") and key.endswith("_ms"):
                 self.times.setdefault(key[5:-3], []).append(float(value))
-        if result.health in NO_POSE:
+        if not result.has_pose:
+            self.without_pose[result.status] += 1
             return False
         self._follow(result)
         return True
@@ -252,9 +253,7 @@ def _scan_counts(reader: dict[str, int], tally: _Tally, host: dict[str, int]) ->
     unread = read - tally.scans_fed - sum(dropped.values())
     if unread > 0:
         dropped["beyond_max_scans"] = unread
-    for health in NO_POSE:
-        if tally.health[health]:
-            dropped[f"health_{health.lower()}"] = tally.health[health]
+    dropped |= {f"no_pose_{status}": n for status, n in tally.without_pose.items()}
     rest = tally.scans_fed - sum(tally.health.values())
     if rest > 0:  # the host's own counts tell why
         dropped["before_processing"] = rest

@@ -16,6 +16,7 @@ class FakeResult:
     stamp: int
     status: str
     health: str
+    has_pose: bool
     T_map_imu: np.ndarray
     diagnostics: dict[str, float | int | str] = field(default_factory=dict)
 
@@ -93,7 +94,7 @@ class FakeHost:
             "lambda_r_1": 50.0,
             "time_total_ms": 1.0 + index,
         }
-        return FakeResult(end, "ok", health, pose, row)
+        return FakeResult(end, "ok", health, index > 0, pose, row)
 
     def finish(self) -> None:
         self._finished = True

@@ -46,7 +46,7 @@ def test_three_files_and_every_scan_accounted_for(
     assert record.status == "complete"
     assert record.scans.read == SCANS
     assert record.scans.processed + sum(record.scans.dropped.values()) == SCANS
-    assert record.scans.dropped == {"health_init": 1}
+    assert record.scans.dropped == {"no_pose_ok": 1}
     assert record.params["rejection.mode"] == "kiss"
     assert record.params["preprocess.blind"] == "0.7"
     assert record.params["fake.nan_at"] == "-1"
@@ -75,7 +75,7 @@ def test_same_inputs_same_hash(source: Source, tmp_path: Path, fake_host) -> Non
 def test_max_scans(source: Source, tmp_path: Path, fake_host) -> None:
     record = run(source, RunOptions(host=fake_host, max_scans=3), tmp_path / "out")
     assert record.scans.processed == 2
-    assert record.scans.dropped["health_init"] == 1
+    assert record.scans.dropped["no_pose_ok"] == 1
 
 
 def test_pose_that_is_not_finite_is_divergence(source: Source, tmp_path: Path, fake_host) -> None:

@@ -27,7 +27,7 @@ from rich.progress import (
     TimeRemainingColumn,
 )
 
-from d2lio.errors import DataError
+from d2lio.errors import ConfigError, DataError
 
 EXIT_BUG = 1
 EXIT_USAGE = 2  # typer's own code for bad options; also a refused configuration
@@ -67,11 +67,6 @@ def emit_json(model: BaseModel | str) -> None:
     sys.stdout.write(text + "\n")
 
 
-def _is_config_error(error: ValueError) -> bool:
-    # d2lio.errors.ConfigError and its C++ counterpart share these attributes, not a base.
-    return all(hasattr(error, name) for name in ("key", "value", "allowed"))
-
-
 @contextmanager
 def guard() -> Iterator[None]:
     """Turns the errors a user can cause into one line and an exit code."""
@@ -89,9 +84,7 @@ def guard() -> Iterator[None]:
         full = err.errno in (errno.ENOSPC, errno.EDQUOT)
         complain("the disk is full; nothing was left half-written" if full else str(err))
         raise typer.Exit(EXIT_DATA) from None
-    except ValueError as err:
-        if not _is_config_error(err):
-            raise
+    except ConfigError as err:
         complain(str(err))
         raise typer.Exit(EXIT_USAGE) from None
 

@@ -12,6 +12,12 @@ import numpy as np
 from d2lio.datasets.events import NS_PER_S, Event, Notes, RawEvent, RawScan, Reader, Scan, TimeHint
 from d2lio.errors import DataError
 
+# The core says what it found in words; the same setting as a hint has a short name.
+REFERENCE_NAMES = {
+    "a stamp at the scan start": "start",
+    "a stamp at the scan end": "end",
+    "the clock's epoch": "absolute",
+}
 NO_TIMES = (
     "the cloud has no per-point times; set `lidar.synchronised: true` if it is motion compensated, "
     "or `lidar.pseudo_times: true` to estimate them from the azimuth"
@@ -75,7 +81,8 @@ class TimeResolver:
         if self._locked:
             return
         self._locked = True
-        self._hint = replace(self._hint, unit=found["unit"], reference=found["reference"])
+        reference = REFERENCE_NAMES.get(found["reference"], found["reference"])
+        self._hint = replace(self._hint, unit=found["unit"], reference=reference)
         self._notes.tell(found["message"])
 
     def _refuse(self, raw: RawScan, found: dict) -> Scan | None:
