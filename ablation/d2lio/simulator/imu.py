@@ -39,7 +39,7 @@ IMU_GRADES: dict[str, ImuGrade] = {
     ),
     "industrial": ImuGrade(
         "calibrated industrial MEMS, as in the Xsens MTi or BMI088",
-        2.4e-4, 1.7e-3, 2e-5, 4e-4, 3e-3, 4e-2, 1.5e-3, 1.5e-3,
+        2.4e-4, 1.7e-3, 2e-5, 3e-4, 3e-3, 4e-2, 1.5e-3, 1.5e-3,
     ),
     "consumer": ImuGrade(
         "uncalibrated consumer MEMS, as in the MPU-6050",

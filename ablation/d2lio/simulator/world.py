@@ -94,6 +94,10 @@ class Mover:
             + np.linalg.norm(self.body.center)
         )
         to_body = middle.mean(axis=0) - origin
+        far = max(np.linalg.norm(to_body[0]), np.linalg.norm(to_body[-1]))
+        travelled = np.linalg.norm(origin[-1] - origin[0])
+        if far > reach + slack + travelled:
+            return np.empty(0, dtype=np.int64), Hits.none(0)
         along = np.einsum("ni,ni->n", to_body, direction)
         away = np.einsum("ni,ni->n", to_body, to_body) - along**2
         near = np.flatnonzero((away < slack**2) & (along > -slack) & (along < reach + slack))

@@ -38,7 +38,7 @@ def highway(scene: np.random.Generator, motion: np.random.Generator, duration: f
     def path(along: np.ndarray) -> np.ndarray:
         return road.at(along, lane, 1.9)
 
-    trajectory = drive(path, HIGHWAY_SPEED, duration, motion, ramp=7.0, ride=CAR_RIDE)
+    trajectory = drive(path, HIGHWAY_SPEED, duration, motion, ramp=16.0, ride=CAR_RIDE)
     return World(Body(mesh), trajectory, tuple(_highway_traffic(road, duration, scene)))
 
 
@@ -71,7 +71,7 @@ def _highway_traffic(road: Road, duration: float, rng: np.random.Generator) -> l
     movers = []
     for lane in (-9.0, -2.9):  # slower on the right, faster on the left
         pace = 0.85 if lane < -5.0 else 1.1
-        for start in (-70.0, 30.0, 130.0, 260.0):
+        for start in (-380.0, -280.0, -190.0, -100.0, 0.0, 110.0):
             speed = HIGHWAY_SPEED * pace * rng.uniform(0.97, 1.03)
             place = start + rng.uniform(-25.0, 25.0)
             movers.append(moving_car(road, place, lane, speed, duration, rng))
@@ -114,7 +114,7 @@ def bridge(scene: np.random.Generator, motion: np.random.Generator, duration: fl
     def path(along: np.ndarray) -> np.ndarray:
         return road.at(along, -2.0, 1.8)
 
-    trajectory = drive(path, BRIDGE_SPEED, duration, motion, ramp=5.0, ride=CAR_RIDE)
+    trajectory = drive(path, BRIDGE_SPEED, duration, motion, ramp=8.0, ride=CAR_RIDE)
     return World(Body(mesh), trajectory, tuple(movers))
 
 

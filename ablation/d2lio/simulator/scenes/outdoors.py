@@ -15,7 +15,7 @@ OFFROAD_SPEED = 3.0  # m/s
 OFFROAD_VIEW = 70.0  # m of terrain around the drive
 OFFROAD_RIDE = Ride(0.012, 0.008, 0.015, 0.015, 0.006, (0.5, 2.0), 0.0008, 0.001, (4.0, 7.5))
 TREE_AREA, BUSH_AREA = 170.0, 90.0  # m² of ground per tree, per bush
-TRACK = 3.0  # m kept free on both sides of the wheels
+TRACK = 4.0  # m kept free on both sides of the wheels
 
 BOAT_SPEED = 3.0
 BOAT_RIDE = Ride(0.03, 0.03, 0.025, 0.012, 0.01, (0.12, 0.5), 0.0003, 0.0004, (5.0, 7.5))
@@ -82,7 +82,7 @@ def waterway(scene: np.random.Generator, motion: np.random.Generator, duration: 
     def path(along: np.ndarray) -> np.ndarray:
         return road.at(along, 1.5, 1.6)
 
-    trajectory = drive(path, BOAT_SPEED, duration, motion, ramp=5.0, ride=BOAT_RIDE)
+    trajectory = drive(path, BOAT_SPEED, duration, motion, ramp=8.0, ride=BOAT_RIDE)
     return World(Body(mesh), trajectory)
 
 
@@ -121,4 +121,4 @@ def flat_ground(scene: np.random.Generator, motion: np.random.Generator, duratio
     def path(s: np.ndarray) -> np.ndarray:
         return road.at(s, 0.0, 1.4)
 
-    return World(Body(mesh), drive(path, FLAT_SPEED, duration, motion))
+    return World(Body(mesh), drive(path, FLAT_SPEED, duration, motion, ramp=4.0))

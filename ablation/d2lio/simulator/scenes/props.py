@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from d2lio.simulator.mesh import Mesh
-from d2lio.simulator.trajectory import Trajectory, time_grid
+from d2lio.simulator.trajectory import Trajectory, activity, integrate, time_grid
 from d2lio.simulator.world import Body, Mover
 
 CAR_LENGTH = 4.4  # m
@@ -122,16 +122,24 @@ def car(mesh: Mesh, foot: np.ndarray, yaw: float, rng: np.random.Generator) -> N
 
 
 def moving_car(
-    road: Road, start: float, left: float, speed: float, duration: float, rng: np.random.Generator
+    road: Road,
+    start: float,
+    left: float,
+    speed: float,
+    duration: float,
+    rng: np.random.Generator,
+    ramp: float | None = None,
 ) -> Mover:
-    """A car on a lane of the road; a negative speed (m/s) comes the other way."""
+    """A car on a lane of the road; a negative speed (m/s) comes the other way.
+
+    With a ramp (s) it waits through the standstill and sets off together with the sensor.
+    """
     mesh = Mesh()
     car(mesh, np.zeros(3), 0.0, rng)
     t = time_grid(duration)
-    s = start + speed * t
-    angles = np.zeros((len(t), 3))
-    angles[:, 0] = road.heading(s) + (np.pi if speed < 0.0 else 0.0)
-    return Mover(Body(mesh), Trajectory(t, road.at(s, left), angles, duration))
+    s = start + speed * (t if ramp is None else integrate(t, activity(t, ramp)))
+    turn = np.pi if speed < 0.0 else 0.0
+    return Mover(Body(mesh), _along(road, s, left, turn, t, duration))
 
 
 def pedestrian(road: Road, start: float, left: float, speed: float, duration: float) -> Mover:
@@ -141,7 +149,12 @@ def pedestrian(road: Road, start: float, left: float, speed: float, duration: fl
     mesh.box((0.0, 0.0, 1.15), (0.26, 0.46, 0.62), "wood")
     mesh.box((0.0, 0.0, 1.62), (0.2, 0.18, 0.26), "wood")
     t = time_grid(duration)
-    s = start + speed * t
+    return Mover(Body(mesh), _along(road, start + speed * t, left, 0.0, t, duration))
+
+
+def _along(
+    road: Road, s: np.ndarray, left: float, turn: float, t: np.ndarray, duration: float
+) -> Trajectory:
     angles = np.zeros((len(t), 3))
-    angles[:, 0] = road.heading(s)
-    return Mover(Body(mesh), Trajectory(t, road.at(s, left), angles, duration))
+    angles[:, 0] = road.heading(s) + turn
+    return Trajectory(t, road.at(s, left), angles, duration)

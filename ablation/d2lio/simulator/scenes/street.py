@@ -12,6 +12,7 @@ from d2lio.simulator.trajectory import drive
 from d2lio.simulator.world import Body, Mover, World
 
 SPEED = 6.0  # m/s
+RAMP = 5.0  # s from standstill to cruise speed
 VIEW = 100.0  # m of street beyond both ends of the drive
 CURB, FRONT = 6.2, 9.0  # m from the middle of the street to the curb, to the façades
 LANE = -1.8  # m, own lane (right-hand traffic)
@@ -35,7 +36,7 @@ def build(scene: np.random.Generator, motion: np.random.Generator, duration: flo
     def path(along: np.ndarray) -> np.ndarray:
         return road.at(along, LANE, 1.8)
 
-    return World(Body(mesh), drive(path, SPEED, duration, motion), tuple(movers))
+    return World(Body(mesh), drive(path, SPEED, duration, motion, ramp=RAMP), tuple(movers))
 
 
 def _facades(
@@ -101,7 +102,7 @@ def _furniture(
 
 
 def _traffic(road: Road, duration: float, rng: np.random.Generator) -> list[Mover]:
-    movers = [moving_car(road, 14.0, LANE, SPEED * rng.uniform(0.98, 1.05), duration, rng)]
+    movers = [moving_car(road, 14.0, LANE, SPEED * rng.uniform(0.98, 1.05), duration, rng, RAMP)]
     gap = 20.0
     while gap < 2.0 * SPEED * duration:
         speed = -SPEED * rng.uniform(0.8, 1.4)
