@@ -10,9 +10,10 @@ from d2lio.simulator.mesh import Mesh
 from d2lio.simulator.trajectory import handheld
 from d2lio.simulator.world import Body, World
 
-# No multiple of the usual voxel sizes: the map keeps of every voxel the point nearest to its centre,
-# which pulls a noisy surface towards the centre. Floor and ceiling a whole number of 0.5 m voxels
-# apart are pulled the same way, and the estimate drifts by centimetres; no real room is that exact.
+# No multiple of the usual voxel sizes: of every voxel the map keeps the point nearest to its
+# centre, which pulls a noisy surface towards the centre. Floor and ceiling a whole number of 0.5 m
+# voxels apart are pulled the same way, and the estimate drifts by centimetres; no real room is
+# that exact.
 SIZE = (11.3, 9.2, 2.7)  # m
 LOOP = (2.6, 1.9)  # m, half axes of the walk
 LOOP_RATE = 0.45  # rad/s
