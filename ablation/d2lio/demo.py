@@ -30,11 +30,17 @@ Progress = Callable[[str, int, int], None]
 
 @dataclass(frozen=True, slots=True)
 class Scene:
-    """A simulated sequence of the demo; duration in s, None for the scene's own."""
+    """A simulated sequence of the demo.
+
+    Attributes:
+        duration: s, None for the scene's own.
+        params: host parameters that every variant gets there, as `key=value`.
+    """
 
     name: str
     title: str
     duration: float | None
+    params: tuple[str, ...] = ()
     seed: int = 0
 
     @property
@@ -65,7 +71,7 @@ class Variant:
 SCENES = (
     Scene("offroad", "Off-road", 20.0),
     Scene("tunnel_cabinets", "Tunnel with cabinets", None),
-    Scene("room", "Room", None),
+    Scene("room", "Room", None, ("filter_size_surf=0.25", "filter_size_map=0.25")),
 )
 VARIANTS = tuple(
     Variant(rejection, degeneracy)
@@ -185,6 +191,7 @@ def run_demo(
 def _run_row(row: Row, sequence: Path, truth: Path, threads: int) -> None:
     row.directory.parent.mkdir(parents=True, exist_ok=True)
     log = row.directory.with_suffix(".log")
+    assignments = [part for text in row.scene.params for part in ("--set", text)]
     command = d2lio_command(
         "run",
         str(sequence),
@@ -196,6 +203,7 @@ def _run_row(row: Row, sequence: Path, truth: Path, threads: int) -> None:
         str(threads),
         "--out",
         str(row.directory),
+        *assignments,
     )
     shutil.rmtree(row.directory, ignore_errors=True)  # never score an earlier run
     outcome = run_process(command, log, RUN_TIMEOUT_S)

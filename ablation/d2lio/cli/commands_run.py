@@ -81,13 +81,20 @@ def run(
             raise typer.Exit(EXIT_FAILED)
 
 
+def _plain_table() -> Table:
+    table = Table(show_header=False, box=None, pad_edge=False)
+    table.add_column()
+    table.add_column(overflow="fold")
+    return table
+
+
 def _report_run(record: RunRecord, target: Path, as_json: bool) -> None:
     if as_json:
         emit_json(record)
         return
     for message in record.notes:
         note(message)
-    table = Table(show_header=False, box=None, pad_edge=False)
+    table = _plain_table()
     total = record.time_ms.get("total")
     rows = {
         "scans": f"{record.scans.processed} of {record.scans.read}",
@@ -157,7 +164,7 @@ def evaluate(
 
 
 def _report_evaluation(result: Evaluation) -> None:
-    table = Table(show_header=False, box=None, pad_edge=False)
+    table = _plain_table()
 
     def row(name: str, value: float | None, unit: str) -> None:
         table.add_row(f"[dim]{name}[/]", "-" if value is None else f"{value:.4f} {unit}")

@@ -18,6 +18,7 @@ from d2lio.metrics.tum import Trajectory, interpolate
 
 GAP_PERIODS = 5.0  # a gap longer than this many median periods is a hole
 MIN_GAP_S = 0.3
+START_UP_S = 1.0  # an estimator may take this long to initialise
 
 Interpolated = Literal["truth", "estimate", "none"]
 
@@ -54,7 +55,8 @@ def match(truth: Trajectory, estimate: Trajectory) -> Matched:
 def coverage(truth: Trajectory, estimate: Trajectory) -> float:
     """Share of the truth's time span in which the estimate has poses without a hole, in [0, 1].
 
-    Half a period is granted at either end, so that a complete run reaches 1.
+    Up to START_UP_S at the start and MIN_GAP_S at the end count as covered, so that a complete
+    run reaches 1.
     """
     begin, end = int(truth.stamps[0]), int(truth.stamps[-1])
     if end <= begin:
@@ -64,7 +66,6 @@ def coverage(truth: Trajectory, estimate: Trajectory) -> float:
         return 0.0
     gaps = np.diff(stamps) / NS_PER_S
     covered = float(gaps[gaps <= max_gap_s(estimate)].sum())
-    margin = min(max_gap_s(estimate), MIN_GAP_S)
-    for edge in ((stamps[0] - begin) / NS_PER_S, (end - stamps[-1]) / NS_PER_S):
-        covered += float(edge) if edge <= margin else 0.0
+    for edge, granted in ((stamps[0] - begin, START_UP_S), (end - stamps[-1], MIN_GAP_S)):
+        covered += edge / NS_PER_S if edge <= granted * NS_PER_S else 0.0
     return min(1.0, covered / ((end - begin) / NS_PER_S))

@@ -170,8 +170,6 @@ def thresholds(runs: list[tuple[Row, Columns]]) -> Figure:
     for row, columns in runs:
         if row.variant.rejection not in ("fixed", "kiss", "point_adaptive"):
             continue
-        if row.variant.degeneracy != "none":
-            continue
         t = seconds_from_start(columns)
         data.append(_curve(f"{row.variant.label}, median", t, columns["epsilon_median"], row))
         if row.variant.rejection == "point_adaptive":

@@ -89,7 +89,12 @@ def _scene(result: DemoResult, scene: Scene) -> dict[str, Any]:
         figures.rejections(runs),
         figures.timing(runs),
     ]
-    return {"id": scene.name, "title": scene.title, "figures": [p for p in plots if p["data"]]}
+    return {
+        "id": scene.name,
+        "title": scene.title,
+        "params": ", ".join(scene.params),
+        "figures": [p for p in plots if p["data"]],
+    }
 
 
 def write_report(result: DemoResult, path: Path) -> None:
