@@ -1,0 +1,85 @@
+// SPDX-FileCopyrightText: 2026 D2-LIO contributors
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <functional>
+#include <string>
+#include <vector>
+
+#include "d2lio/fastlio/host.hpp"
+#include "synthetic_room.hpp"
+
+namespace d2lio::test {
+
+/// Parameters that fit SyntheticRoom.
+inline fastlio::ParamMap room_params(fastlio::ParamMap extra = {}) {
+    const Pose T = SyntheticRoom::T_imu_lidar();
+    std::string R, t;
+    for (int r = 0; r < 3; ++r) {
+        t += std::to_string(T.t[r]) + " ";
+        for (int c = 0; c < 3; ++c) R += std::to_string(T.R(r, c)) + " ";
+    }
+    fastlio::ParamMap params{{"mapping.extrinsic_R", R},
+                             {"mapping.extrinsic_T", t},
+                             {"point_filter_num", "1"},
+                             {"preprocess.blind", "0.3"}};
+    for (auto& [key, value] : extra) params[key] = value;
+    return params;
+}
+
+inline void step_all(fastlio::Host& host, std::vector<fastlio::ScanResult>& out) {
+    while (auto r = host.step()) out.push_back(std::move(*r));
+}
+
+/// Feeds samples and scans in order of arrival. `keep_imu` and `edit` may damage the data.
+struct Drive {
+    int scans = 40;
+    Stamp start = SyntheticRoom::kStart;
+    std::function<bool(ImuSample&)> keep_imu = [](ImuSample&) { return true; };
+    std::function<bool(int, Scan&)> edit = [](int, Scan&) { return true; };
+
+    void feed(fastlio::Host& host, SyntheticRoom& room,
+              std::vector<fastlio::ScanResult>& out) const {
+        Stamp imu = start;
+        for (int i = 0; i < scans; ++i) {
+            const Stamp begin = start + i * SyntheticRoom::kScanPeriod;
+            Scan scan = room.scan(begin);
+            if (edit(i, scan)) host.add_scan(std::move(scan));
+            for (; imu <= begin + SyntheticRoom::kScanPeriod; imu += SyntheticRoom::kImuPeriod) {
+                ImuSample s = room.imu(imu);
+                if (keep_imu(s)) host.add_imu(s);
+            }
+            step_all(host, out);
+        }
+    }
+};
+
+inline std::vector<fastlio::ScanResult> run(const fastlio::ParamMap& extra = {}, int threads = 1,
+                                            const Drive& drive = {}) {
+    SyntheticRoom room;
+    fastlio::Host host(room_params(extra), threads);
+    std::vector<fastlio::ScanResult> out;
+    drive.feed(host, room, out);
+    host.finish();
+    step_all(host, out);
+    return out;
+}
+
+/// Largest distance (m) between estimate and truth, both relative to the first pose.
+inline double largest_error(const std::vector<fastlio::ScanResult>& results) {
+    const fastlio::ScanResult* first = nullptr;
+    double worst = 0.0;
+    for (const auto& r : results) {
+        if (!r.has_pose) continue;
+        if (first == nullptr) first = &r;
+        const auto truth = [](const fastlio::ScanResult& x) {
+            return SyntheticRoom::pose(seconds_between(x.stamp, SyntheticRoom::kStart));
+        };
+        const Pose estimated = first->state.T_map_imu().inverse() * r.state.T_map_imu();
+        const Pose expected = truth(*first).inverse() * truth(r);
+        worst = std::max(worst, (estimated.t - expected.t).norm());
+    }
+    return worst;
+}
+
+}  // namespace d2lio::test

@@ -1,0 +1,102 @@
+# SPDX-FileCopyrightText: 2026 D2-LIO contributors
+# SPDX-License-Identifier: BSD-3-Clause
+"""The nanobind module `d2lio._fastlio` on short simulated sequences."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from d2lio import runner
+from d2lio._fastlio import FastLioHost
+from d2lio.datasets import open_source
+from d2lio.errors import ConfigError
+from d2lio.simulator import simulate
+
+
+def _run(sequence: Path, out: Path, **options):
+    record = runner.run(open_source(sequence), runner.RunOptions(**options), out)
+    return record, np.genfromtxt(
+        out / "diagnostics.csv", delimiter=",", names=True, dtype=None, encoding="utf-8"
+    )
+
+
+@pytest.fixture(scope="module")
+def tunnel(tmp_path_factory) -> Path:
+    out = tmp_path_factory.mktemp("tunnel") / "tunnel"
+    simulate("tunnel", out, seed=3, duration=12.0)
+    return out
+
+
+@pytest.fixture(scope="module")
+def room(tmp_path_factory) -> Path:
+    out = tmp_path_factory.mktemp("room") / "room"
+    simulate("room", out, seed=0, duration=8.0)
+    return out
+
+
+def _axis(sequence: Path) -> np.ndarray:
+    """Direction of the tunnel in the map frame, which is the first IMU frame."""
+    truth = np.loadtxt(sequence / "gt.tum")
+    from scipy.spatial.transform import Rotation
+
+    direction = truth[-1, 1:4] - truth[0, 1:4]
+    return Rotation.from_quat(truth[0, 4:8]).inv().apply(direction / np.linalg.norm(direction))
+
+
+def test_bare_tunnel_names_its_axis(tunnel, tmp_path):
+    _, rows = _run(tunnel, tmp_path / "run")
+    rows = rows[rows["health"] != "INIT"]
+    weakest = np.column_stack([rows["v_t_1_x"], rows["v_t_1_y"], rows["v_t_1_z"]])
+    cosine = np.abs(weakest @ _axis(tunnel))
+    within = np.degrees(np.arccos(np.clip(cosine, -1, 1))) <= 2.0
+    assert within.mean() >= 0.95
+    assert (rows["weak_t"] >= 1).mean() >= 0.95
+    assert (rows["health"] == "DEGENERATE").mean() >= 0.95
+
+
+def test_the_room_is_not_called_degenerate(room, tmp_path):
+    record, rows = _run(room, tmp_path / "run")
+    assert record.health.get("OK", 0) >= 0.95 * (len(rows) - 3)
+
+
+@pytest.mark.parametrize("mode", ["off", "point_adaptive"])
+def test_two_threads_give_the_same_bytes(room, tmp_path, mode):
+    outputs = []
+    for name, threads in (("one", 1), ("two", 2), ("again", 2)):
+        _run(room, tmp_path / name, rejection=mode, degeneracy="paper", threads=threads)
+        outputs.append((tmp_path / name / "trajectory.tum").read_bytes())
+    assert outputs[0] == outputs[1] == outputs[2]
+
+
+def test_describe_names_every_parameter():
+    keys = {p["key"] for p in FastLioHost.describe()}
+    assert {"rejection.mode", "degeneracy.w", "filter_size_map", "mapping.acc_cov"} <= keys
+    for p in FastLioHost.describe():
+        assert set(p) == {"key", "type", "default", "range", "unit", "doc"}
+
+
+def test_refused_parameters_reach_python_with_their_names():
+    with pytest.raises(ConfigError) as caught:
+        FastLioHost({"filter_size_map": "-1"})
+    assert (caught.value.key, caught.value.value) == ("filter_size_map", "-1")
+    assert "0.01" in caught.value.allowed
+    with pytest.raises(ConfigError, match="filter_size_mop"):
+        FastLioHost({"filter_size_mop": "1"})
+
+
+def test_arrays_of_different_length_are_refused():
+    host = FastLioHost()
+    with pytest.raises(ValueError, match="length"):
+        host.add_imu(np.zeros(2, np.int64), np.zeros((3, 3)), np.zeros((2, 3)))
+    with pytest.raises(ValueError, match="length"):
+        host.add_scan(0, np.zeros((4, 3), np.float32), np.zeros(3, np.int32))
+
+
+def test_without_data_there_is_nothing_to_step():
+    host = FastLioHost()
+    assert host.step() is None
+    host.finish()
+    assert host.step() is None
+    assert host.map_points().shape == (0, 3)

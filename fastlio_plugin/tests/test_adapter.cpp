@@ -1,0 +1,300 @@
+// SPDX-FileCopyrightText: 2026 D2-LIO contributors
+// SPDX-License-Identifier: BSD-3-Clause
+#include <gtest/gtest.h>
+
+#include <Eigen/Eigenvalues>
+#include <Eigen/LU>
+#include <cmath>
+#include <limits>
+#include <map>
+#include <string>
+
+#include "d2lio/diagnostics/scan_diagnostics.hpp"
+#include "d2lio/fastlio/adapter.hpp"
+#include "random_state.hpp"
+
+namespace d2lio::fastlio {
+namespace {
+
+constexpr double kVariance = 0.001;
+constexpr double kExact = 1e-9;
+
+/// Five neighbours on the plane z = 0 around the origin of a patch, with what accept needs.
+struct Patch {
+    float neighbours[15] = {0.1F, 0,    0,    -0.1F, 0.05F, 0,     0, 0.2F,
+                            0,    0.2F, 0.2F, 0,     -0.2F, -0.2F, 0};
+    float sq[5] = {0.01F, 0.02F, 0.04F, 0.08F, 0.09F};
+    float p[3] = {0.F, 0.F, 0.05F};
+    Candidate candidate(std::size_t index = 0) const {
+        Candidate c{};
+        c.index = index;
+        c.fresh = true;
+        c.imu_range = c.lidar_range = 10.0;
+        c.p_map = p;
+        c.neighbours = neighbours;
+        c.sq_distances = sq;
+        c.neighbour_step = 3;
+        c.distance_step = 1;
+        c.neighbour_count = 5;
+        return c;
+    }
+    void lift(float z) {  // planes through the origin of the map cannot be expressed upstream
+        for (int i = 0; i < 5; ++i) neighbours[3 * i + 2] += z;
+        p[2] += z;
+    }
+};
+
+struct Scene {
+    Pose previous, predicted;
+    Mat23x23 P = Mat23x23::Identity() * 1e-2;
+    ScanInput input(std::size_t points = 4) const {
+        return {{previous.R.data(), previous.t.data()},
+                {predicted.R.data(), predicted.t.data()},
+                P.data(),
+                23,
+                0,
+                3,
+                points};
+    }
+    PoseView view() const { return {predicted.R.data(), predicted.t.data()}; }
+};
+
+using RowMatrix = Eigen::Matrix<double, Eigen::Dynamic, 12, Eigen::RowMajor>;
+
+Rows view(RowMatrix& H, Eigen::VectorXd& r) {
+    return {H.data(), r.data(), static_cast<int>(H.rows()), 12, 1, 0, 3};
+}
+
+TEST(Adapter, RefusesUnknownKeysAndBadValuesByName) {
+    Adapter a;
+    EXPECT_TRUE(a.set("rejection.mode", "kiss"));
+    EXPECT_STREQ(a.error(), "");
+    EXPECT_FALSE(a.set("rejection.mode", "kis"));
+    EXPECT_NE(std::string(a.error()).find("rejection.mode"), std::string::npos);
+    EXPECT_FALSE(a.set("rejection.tua", "2"));
+    EXPECT_FALSE(a.set("degeneracy.w", "nan"));
+    EXPECT_TRUE(a.rejects());
+    EXPECT_FALSE(a.has_prior());
+}
+
+TEST(Adapter, OffAppliesUpstreamsGates) {
+    Adapter a;
+    Patch patch;
+    patch.lift(2.F);
+    Correspondence m{};
+    a.begin_scan(Scene().input());
+    EXPECT_EQ(a.accept(patch.candidate(0), &m), Verdict::kAccepted);
+    EXPECT_NEAR(std::abs(m.residual), 0.05, 1e-5);
+    EXPECT_NEAR(std::abs(m.normal[2]), 1.0, 1e-5);
+    Patch far = patch;
+    far.sq[4] = 5.01F;
+    EXPECT_EQ(a.accept(far.candidate(1), &m), Verdict::kFarNeighbours);
+    Patch off = patch;
+    off.p[2] += 0.4F;  // sqrt(10) / 9 = 0.351 m is the bound at 10 m
+    EXPECT_EQ(a.accept(off.candidate(2), &m), Verdict::kResidual);
+    Candidate few = patch.candidate(3);
+    few.neighbour_count = 4;
+    EXPECT_EQ(a.accept(few, &m), Verdict::kFewNeighbours);
+}
+
+TEST(Adapter, ModesSwitchTheHostsDistanceGatesOff) {
+    Adapter a;
+    a.set("rejection.mode", "none");
+    Patch far;
+    far.lift(2.F);
+    far.sq[4] = 50.F;
+    far.p[2] += 1.F;
+    Correspondence m{};
+    a.begin_scan(Scene().input());
+    EXPECT_EQ(a.accept(far.candidate(0), &m), Verdict::kAccepted);
+    EXPECT_EQ(a.max_search_sq_distance(), std::numeric_limits<float>::infinity());
+    a.set("rejection.keep_host_gate", "true");
+    EXPECT_EQ(a.max_search_sq_distance(), 5.F);
+    a.begin_scan(Scene().input());
+    EXPECT_EQ(a.accept(far.candidate(0), &m), Verdict::kFarNeighbours);
+}
+
+TEST(Adapter, FixedThresholdCutsAtTau) {
+    Adapter a;
+    a.set("rejection.mode", "fixed");
+    a.set("rejection.tau", "0.5");
+    Patch p;
+    p.lift(2.F);
+    p.sq[0] = 0.2499F;
+    Correspondence m{};
+    a.begin_scan(Scene().input());
+    EXPECT_EQ(a.accept(p.candidate(0), &m), Verdict::kAccepted);
+    p.sq[0] = 0.2501F;
+    EXPECT_EQ(a.accept(p.candidate(1), &m), Verdict::kThreshold);
+}
+
+TEST(Adapter, ARejectedPointStaysOutUntilTheNextSearch) {
+    Adapter a;
+    Patch off;
+    off.lift(2.F);
+    off.p[2] += 0.4F;
+    Correspondence m{};
+    a.begin_scan(Scene().input());
+    EXPECT_EQ(a.accept(off.candidate(0), &m), Verdict::kResidual);
+    off.p[2] -= 0.4F;
+    Candidate again = off.candidate(0);
+    again.fresh = false;
+    EXPECT_EQ(a.accept(again, &m), Verdict::kResidual);
+    EXPECT_EQ(a.accept(off.candidate(0), &m), Verdict::kAccepted);
+}
+
+TEST(Adapter, SingularPlanesHaveTheirOwnReason) {
+    Adapter a;
+    a.set("rejection.mode", "none");
+    Patch line;
+    for (int i = 0; i < 5; ++i) {
+        line.neighbours[3 * i] = 0.1F * static_cast<float>(i);
+        line.neighbours[3 * i + 1] = 1.F;
+        line.neighbours[3 * i + 2] = 2.F;
+    }
+    Correspondence m{};
+    a.begin_scan(Scene().input());
+    EXPECT_EQ(a.accept(line.candidate(0), &m), Verdict::kSingularPlane);
+    a.end_scan(Scene().view(), true, nullptr, 0);
+    EXPECT_EQ(a.diagnostics().counts.singular_plane, 1);
+}
+
+TEST(Adapter, NaNInputRunsWithoutThePlugIn) {
+    Adapter a;
+    a.set("degeneracy.method", "paper");
+    Scene s;
+    s.predicted.t.x() = std::numeric_limits<double>::quiet_NaN();
+    EXPECT_EQ(a.begin_scan(s.input()), Status::kBadInput);
+    RowMatrix H = RowMatrix::Ones(30, 12);
+    Eigen::VectorXd r = Eigen::VectorXd::Ones(30);
+    PriorBlock prior{};
+    EXPECT_EQ(a.condition(view(H, r), s.view(), kVariance, &prior), Status::kNoScan);
+    EXPECT_EQ(prior.count, 0);
+    EXPECT_EQ(a.end_scan(s.view(), true, nullptr, 0), Status::kNoScan);
+}
+
+/// Random rows with little information along the map's x axis.
+RowMatrix weak_rows(test::Random& random, Eigen::Index n) {
+    RowMatrix H = RowMatrix::Zero(n, 12);
+    for (Eigen::Index i = 0; i < n; ++i) {
+        const Vec3 normal(0.02 * random.normal(), random.normal(), random.normal());
+        H.block<1, 3>(i, 0) = normal.normalized().transpose();
+        H.block<1, 3>(i, 3) = 3.0 * random.vec3(1.0).transpose();
+    }
+    return H;
+}
+
+TEST(Adapter, PriorRowsEqualTheInformationForm) {
+    Adapter a;
+    a.set("degeneracy.method", "paper");
+    a.set("degeneracy.lambda_min", "1e-9");
+    test::Random random(1);
+    Scene s;
+    s.P = random.covariance();
+    ASSERT_EQ(a.begin_scan(s.input()), Status::kOk);
+    RowMatrix H = weak_rows(random, 200);
+    const RowMatrix before = H;
+    Eigen::VectorXd r = Eigen::VectorXd::Zero(200);
+    PriorBlock prior{};
+    ASSERT_EQ(a.condition(view(H, r), s.view(), kVariance, &prior), Status::kOk);
+    EXPECT_EQ(H, before);  // this method adds rows and leaves the scan's alone
+    ASSERT_EQ(prior.count, 6);
+    Eigen::Matrix<double, 6, 6, Eigen::RowMajor> J;
+    for (int i = 0; i < 6; ++i) {
+        for (int j = 0; j < 6; ++j) J(i, j) = prior.jacobian[i][j];
+    }
+    const Eigen::Matrix<double, 6, 6> information = J.transpose() * J / kVariance;
+    // The same weight from its definition, w P^-1/2 (A^T A)^-1 P^-1/2.
+    const auto weight = [](const Mat3& AtA, const Mat3& P) -> Mat3 {
+        const Eigen::SelfAdjointEigenSolver<Mat3> root(P);
+        return 30.0 * root.operatorInverseSqrt() * AtA.inverse() * root.operatorInverseSqrt();
+    };
+    const Mat3 W_t = weight(H.leftCols<3>().transpose() * H.leftCols<3>(), s.P.block<3, 3>(0, 0));
+    const Mat3 W_r =
+        weight(H.middleCols<3>(3).transpose() * H.middleCols<3>(3), s.P.block<3, 3>(3, 3));
+    EXPECT_LT((information.topLeftCorner<3, 3>() - W_t).norm(), 1e-8 * W_t.norm());
+    EXPECT_LT((information.bottomRightCorner<3, 3>() - W_r).norm(), 1e-8 * W_r.norm());
+    EXPECT_LT((information.topRightCorner<3, 3>().norm()), kExact);
+}
+
+TEST(Adapter, ColumnMajorRowsGiveTheSame) {
+    test::Random random(2);
+    RowMatrix H = weak_rows(random, 50);
+    Eigen::Matrix<double, Eigen::Dynamic, 12> C = H;
+    Eigen::VectorXd r = Eigen::VectorXd::Zero(50);
+    PriorBlock p{}, q{};
+    Adapter a;
+    a.set("degeneracy.method", "paper");
+    a.begin_scan(Scene().input());
+    a.condition(view(H, r), Scene().view(), kVariance, &p);
+    a.condition({C.data(), r.data(), 50, 1, 50, 0, 3}, Scene().view(), kVariance, &q);
+    for (int i = 0; i < 6; ++i) {
+        for (int j = 0; j < 6; ++j) EXPECT_EQ(p.jacobian[i][j], q.jacobian[i][j]);
+    }
+}
+
+TEST(Adapter, RemapTakesTheWeakDirectionOutOfTheRows) {
+    Adapter a;
+    a.set("degeneracy.method", "remap");
+    a.set("degeneracy.threshold_r", "0");
+    test::Random random(3);
+    RowMatrix H = weak_rows(random, 400);
+    Eigen::VectorXd r = Eigen::VectorXd::Zero(400);
+    PriorBlock prior{};
+    a.begin_scan(Scene().input());
+    a.condition(view(H, r), Scene().view(), kVariance, &prior);
+    EXPECT_EQ(prior.count, 0);
+    const Eigen::SelfAdjointEigenSolver<Mat3> left(H.leftCols<3>().transpose() * H.leftCols<3>());
+    EXPECT_LT(left.eigenvalues()[0], kExact);
+    EXPECT_GT(left.eigenvalues()[1], 50.0);
+}
+
+TEST(Adapter, TheKeptCovarianceDoesNotClaimThePrior) {
+    test::Random random(4);
+    Scene s;
+    s.P = random.covariance();
+    RowMatrix H = weak_rows(random, 100);
+    Eigen::VectorXd r = Eigen::VectorXd::Zero(100);
+    PriorBlock prior{};
+    Adapter a;
+    a.set("degeneracy.method", "paper");
+    a.begin_scan(s.input());
+    a.condition(view(H, r), s.view(), kVariance, &prior);
+    Eigen::MatrixXd Hx = Eigen::MatrixXd::Zero(100, 23), Hp = Eigen::MatrixXd::Zero(6, 23);
+    Hx.leftCols<12>() = H;
+    for (int i = 0; i < 6; ++i) {
+        for (int j = 0; j < 6; ++j) Hp(i, j) = prior.jacobian[i][j];
+    }
+    const Mat23x23 data = s.P.inverse() + Hx.transpose() * Hx / kVariance;
+    const Mat23x23 without = data.inverse();
+    Mat23x23 P = (data + Hp.transpose() * Hp / kVariance).inverse();
+    EXPECT_GT((P - without).norm(), 1e-3 * without.norm());
+    EXPECT_EQ(a.end_scan(s.view(), true, P.data(), 23), Status::kOk);
+    EXPECT_LT((P - without).norm(), 1e-6 * without.norm());
+}
+
+TEST(Adapter, DiagnosticsNameTheWeakDirection) {
+    Adapter a;
+    test::Random random(5);
+    RowMatrix H = weak_rows(random, 2000);
+    Eigen::VectorXd r = Eigen::VectorXd::Zero(2000);
+    PriorBlock prior{};
+    a.begin_scan(Scene().input());
+    a.condition(view(H, r), Scene().view(), kVariance, &prior);
+    Pose posterior;
+    posterior.t = Vec3(0.3, 0.04, 0.0);
+    a.end_scan({posterior.R.data(), posterior.t.data()}, true, nullptr, 0);
+    const ScanDiagnostics& d = a.diagnostics();
+    EXPECT_EQ(d.weak_t, 1);
+    EXPECT_GT(d.v_t(0, 0), 0.999);
+    EXPECT_NEAR(d.correction_weak_t, 0.3, 0.01);
+    std::map<std::string, double> columns;
+    for (std::size_t i = 0; i < a.diagnostics_size(); ++i) {
+        columns[a.diagnostics_name(i)] = a.diagnostics_value(i);
+    }
+    EXPECT_EQ(columns.at("weak_t"), 1.0);
+    EXPECT_EQ(columns.at("lambda_t_1"), d.lambda_t[0]);
+}
+
+}  // namespace
+}  // namespace d2lio::fastlio
