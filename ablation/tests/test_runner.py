@@ -5,19 +5,22 @@
 from __future__ import annotations
 
 import csv
+import errno
 import json
 from pathlib import Path
 
 import numpy as np
 import pytest
 from bags import NS, START, cloud_message, drive, ros1_store, velodyne_points, write_bag
+from d2lio.cli import app
 from d2lio.datasets import open_source
 from d2lio.datasets.source import Source
 from d2lio.errors import ConfigError, DataError
 from d2lio.hosts import parse_assignments, source_params, stride_for
-from d2lio.output import OutputDir, tum_line
+from d2lio.output import OutputDir, ResultWriter, tum_line
 from d2lio.record import RunRecord
 from d2lio.runner import Interrupted, RunOptions, run
+from typer.testing import CliRunner
 
 SCANS = 8
 
@@ -166,3 +169,19 @@ def test_tum_line_holds_every_digit() -> None:
     assert cells[0] == "1700000000.000000001"
     assert [float(c) for c in cells[1:4]] == [1 / 3, -2e-17, 1e5 / 7]
     assert [float(c) for c in cells[4:]] == [0, 0, 0, 1]
+
+
+def test_full_disk_ends_in_one_line_and_leaves_nothing(
+    source: Source, tmp_path: Path, fake_host, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def full(*_: object) -> None:
+        raise OSError(errno.ENOSPC, "No space left on device")
+
+    monkeypatch.setattr(ResultWriter, "add", full)
+    before = sorted(p.name for p in tmp_path.iterdir())
+    result = CliRunner().invoke(
+        app, ["run", str(tmp_path / "a.bag"), "--host", fake_host, "--out", str(tmp_path / "o")]
+    )
+    assert result.exit_code == 3
+    assert result.stderr.splitlines()[-1].startswith("error: the disk is full")
+    assert sorted(p.name for p in tmp_path.iterdir()) == before

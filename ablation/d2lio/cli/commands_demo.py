@@ -72,7 +72,7 @@ def _print(result: DemoResult) -> None:
     from d2lio.demo import FAIL_PERCENT, REPORT_FILE, RESULTS_FILE, cells
 
     table = Table(
-        title="ATE \\[m], share of accepted correspondences, ms per scan",
+        title="ATE \\[m], accepted correspondences, median ms per scan",
         box=box.SIMPLE_HEAD,
         pad_edge=False,
         collapse_padding=True,

@@ -195,18 +195,20 @@ def rejections(runs: list[tuple[Row, Columns]]) -> Figure:
 
 
 def timing(runs: list[tuple[Row, Columns]]) -> Figure:
-    """Mean time per scan by stage."""
+    """Median time per scan by stage."""
     names = [row.variant.label for row, _ in runs]
     data = []
     for stage in STAGES:
-        means = [
-            row.record.time_ms[stage].mean
+        medians = [
+            row.record.time_ms[stage].median
             for row, _ in runs
             if row.record is not None and stage in row.record.time_ms
         ]
-        if len(means) == len(names):
-            data.append({"type": "bar", "orientation": "h", "name": stage, "x": means, "y": names})
-    return _bars("Time per scan by stage", "mean [ms]", data, STAGE_COLOURS)
+        if len(medians) == len(names):
+            data.append(
+                {"type": "bar", "orientation": "h", "name": stage, "x": medians, "y": names}
+            )
+    return _bars("Time per scan by stage", "median [ms]", data, STAGE_COLOURS)
 
 
 def _bars(title: str, x: str, data: list[Figure], colours: tuple[str, ...]) -> Figure:
