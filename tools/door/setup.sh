@@ -100,7 +100,7 @@ make_venv() { # FINGERPRINT
 
 install_requirements() { # FINGERPRINT
     local list="$BUILD/requirements.txt" missing status=0
-    "$VENV/bin/python" "$ROOT/tools/door/requirements.py" "$ROOT/pyproject.toml" eval test dev \
+    "$VENV/bin/python" "$ROOT/tools/door/requirements.py" "$ROOT/pyproject.toml" eval test ouster dev \
         >"$list" 2>"$LOG_DIR/pip.log" || die_with_log "$E_FAILED" pip 'reading pyproject.toml failed'
     missing=$("$VENV/bin/python" "$ROOT/tools/door/requirements.py" --missing "$list")
     if [[ -n $missing ]]; then
