@@ -3,8 +3,10 @@
 # d2lio_own(<target>): our warning flags (as errors) and, where asked for, sanitizers.
 function(d2lio_own target)
   # GCC sees uninitialised values in Eigen's fixed-size temporaries where there are none.
+  # No fused multiply-adds: results repeat bit for bit whatever the instruction set, and a search's
+  # pruning bound rounds as its distances do.
   target_compile_options(${target} PRIVATE -Wall -Wextra -Wconversion -Werror
-                         -Wno-maybe-uninitialized)
+                         -Wno-maybe-uninitialized -ffp-contract=off)
   if(D2LIO_SANITIZE)
     target_compile_options(${target} PUBLIC -fsanitize=${D2LIO_SANITIZE}
                            -fno-sanitize-recover=all -fno-omit-frame-pointer)

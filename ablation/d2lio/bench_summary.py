@@ -1,0 +1,102 @@
+# SPDX-FileCopyrightText: 2026 D2-LIO contributors
+# SPDX-License-Identifier: BSD-3-Clause
+"""Short tables from Google Benchmark's JSON files: `python -m d2lio.bench_summary FILE...`."""
+
+from __future__ import annotations
+
+import json
+import sys
+from pathlib import Path
+from statistics import median
+from typing import Any
+
+from rich.console import Console
+from rich.table import Table
+
+STAGES = ("preprocess", "deskew", "downsample", "search", "update", "map", "total")
+COST_GOAL_PERCENT = 2.0
+TO_MS = {"ns": 1e-6, "us": 1e-3, "ms": 1.0, "s": 1e3}
+
+Entry = dict[str, Any]
+
+
+def load(paths: list[Path]) -> list[Entry]:
+    """The measured runs of all files; aggregates such as means are left out."""
+    entries: list[Entry] = []
+    for path in paths:
+        entries += json.loads(path.read_text(encoding="utf-8"))["benchmarks"]
+    return [e for e in entries if e.get("run_type", "iteration") == "iteration"]
+
+
+def _named(entries: list[Entry], prefix: str) -> list[Entry]:
+    return [e for e in entries if e["name"].split("/")[0] == prefix]
+
+
+def stage_table(entries: list[Entry]) -> Table:
+    """Time per scan by stage, ms: one row per host setting and thread count."""
+    table = Table(title="time per scan, ms (28 800 raw points)")
+    table.add_column("host")
+    table.add_column("threads", justify="right")
+    for stage in STAGES:
+        table.add_column(stage, justify="right")
+    for prefix, label in (("BM_ScanOff", "off"), ("BM_ScanPointAdaptivePaper", "adaptive, prior")):
+        for entry in _named(entries, prefix):
+            threads = entry["name"].split("/")[1]
+            table.add_row(label, threads, *(f"{entry[s + '_ms']:.2f}" for s in STAGES))
+    return table
+
+
+def plugin_cost(entries: list[Entry]) -> str:
+    """Cost of gate and prior as a share of search and update: median over the repetitions."""
+    shares = [e["share_percent"] for e in _named(entries, "BM_PluginCost")]
+    if not shares:
+        return "gate and prior: not measured"
+    spread = f"{min(shares):.1f} … {max(shares):.1f}"
+    return (
+        f"gate and prior cost {median(shares):.1f} % of the update "
+        f"(median of {len(shares)}, {spread}; goal <= {COST_GOAL_PERCENT:g} %)"
+    )
+
+
+def _size_label(points: str) -> str:
+    count = int(points)
+    return f"{count // 1_000_000}M" if count >= 1_000_000 else f"{count // 1000}k"
+
+
+def tree_table(entries: list[Entry]) -> Table:
+    """ikd-tree operations by map size, with bytes per point."""
+    operations = ("bm_build", "bm_insert_downsampled", "bm_erase_box", "bm_knn5")
+    sizes = sorted({e["name"].split("/")[1] for e in _named(entries, "bm_build")}, key=int)
+    table = Table(title="ikd-tree")
+    table.add_column("points")
+    for title in ("build ms", "insert a scan ms", "delete a box ms", "5-NN us", "bytes/point"):
+        table.add_column(title, justify="right")
+    for size in sizes:
+        cells = []
+        for name in operations:
+            found = [e for e in _named(entries, name) if e["name"].split("/")[1] == size]
+            ms = found[0]["cpu_time"] * TO_MS[found[0]["time_unit"]] if found else float("nan")
+            cells.append(f"{ms * 1e3:.2f}" if name == "bm_knn5" else f"{ms:.3f}")
+        built = next(e for e in _named(entries, "bm_build") if e["name"].split("/")[1] == size)
+        cells.append(f"{built.get('bytes_per_point', float('nan')):.0f}")
+        table.add_row(_size_label(size), *cells)
+    return table
+
+
+def main(arguments: list[str]) -> int:
+    """Prints the tables; 2 when a file is missing."""
+    paths = [Path(a) for a in arguments]
+    missing = [str(p) for p in paths if not p.is_file()]
+    if missing or not paths:
+        print(f"bench_summary: no such file: {', '.join(missing) or '-'}", file=sys.stderr)
+        return 2
+    entries = load(paths)
+    console = Console()
+    console.print(stage_table(entries))
+    console.print(tree_table(entries))
+    console.print(plugin_cost(entries))
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main(sys.argv[1:]))
