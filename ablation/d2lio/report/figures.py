@@ -88,7 +88,7 @@ def _figure(title: str, x: str, y: str, data: list[Figure], **layout: Any) -> Fi
         "layout": {
             "title": {"text": title},
             "showlegend": False,
-            "xaxis": {"title": {"text": x}},
+            "xaxis": {"title": {"text": x, "standoff": 6}},
             "yaxis": {"title": {"text": y}},
             **layout,
         },
@@ -173,8 +173,11 @@ def thresholds(runs: list[tuple[Row, Columns]]) -> Figure:
         t = seconds_from_start(columns)
         data.append(_curve(f"{row.variant.label}, median", t, columns["epsilon_median"], row))
         if row.variant.rejection == "point_adaptive":
-            low = _curve("min", t, columns["epsilon_min"], row, opacity=0.3)
-            high = _curve("max", t, columns["epsilon_max"], row, fill="tonexty", opacity=0.3)
+            low = _curve("min", t, columns["epsilon_min"], row)
+            high = _curve("max", t, columns["epsilon_max"], row, fill="tonexty")
+            for edge in (low, high):
+                edge["line"]["width"] = 0
+            high["fillcolor"] = "rgba(42, 157, 74, 0.18)"
             data += [low, high]
     return _figure("Acceptance radius ε", "time [s]", "ε [m]", data)
 
