@@ -71,7 +71,7 @@ class Variant:
 SCENES = (
     Scene("offroad", "Off-road", 20.0),
     Scene("tunnel_cabinets", "Tunnel with cabinets", None),
-    Scene("room", "Room", None, ("filter_size_surf=0.25", "filter_size_map=0.25")),
+    Scene("room", "Room", None),
 )
 VARIANTS = tuple(
     Variant(rejection, degeneracy)
