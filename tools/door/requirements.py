@@ -3,7 +3,8 @@
 """Requirements of a checkout, read from pyproject.toml, so that they are written down once.
 
 ``requirements.py PYPROJECT EXTRA...`` prints what the package, its build and the extras need.
-``requirements.py --missing FILE`` prints those lines of FILE that this environment does not meet.
+``requirements.py --no-deps PYPROJECT`` prints what is to be installed without its dependencies.
+``requirements.py --missing FILE...`` prints those of their lines that are not met here.
 Standard library and pip only: it runs before anything else is installed.
 """
 
@@ -47,7 +48,13 @@ def missing(lines: list[str]) -> list[str]:
 def main(arguments: list[str]) -> None:
     """Entry point; see the module's description."""
     if arguments[0] == "--missing":
-        lines = missing(Path(arguments[1]).read_text().split("\n")[:-1])
+        lines = missing(
+            [line for name in arguments[1:] for line in Path(name).read_text().splitlines()]
+        )
+    elif arguments[0] == "--no-deps":
+        lines = tomllib.loads(Path(arguments[1]).read_text())["tool"]["d2lio"][
+            "without-dependencies"
+        ]
     else:
         lines = requirements(Path(arguments[0]), arguments[1:])
     print("".join(f"{line}\n" for line in lines), end="")

@@ -99,10 +99,14 @@ make_venv() { # FINGERPRINT
 }
 
 install_requirements() { # FINGERPRINT
-    local list="$BUILD/requirements.txt" missing status=0
-    "$VENV/bin/python" "$ROOT/tools/door/requirements.py" "$ROOT/pyproject.toml" eval test ouster dev \
-        >"$list" 2>"$LOG_DIR/pip.log" || die_with_log "$E_FAILED" pip 'reading pyproject.toml failed'
-    missing=$("$VENV/bin/python" "$ROOT/tools/door/requirements.py" --missing "$list")
+    local lists=("$BUILD/requirements.txt" "$BUILD/requirements-no-deps.txt") missing status=0
+    local pip=("$VENV/bin/python" -m pip install --no-input --progress-bar off)
+    local reader=("$VENV/bin/python" "$ROOT/tools/door/requirements.py")
+    {
+        "${reader[@]}" "$ROOT/pyproject.toml" eval test dev >"${lists[0]}" &&
+            "${reader[@]}" --no-deps "$ROOT/pyproject.toml" >"${lists[1]}"
+    } 2>"$LOG_DIR/pip.log" || die_with_log "$E_FAILED" pip 'reading pyproject.toml failed'
+    missing=$("${reader[@]}" --missing "${lists[@]}")
     if [[ -n $missing ]]; then
         offline && die "$E_DOWNLOAD" "D2LIO_OFFLINE is set and Python packages are missing: ${missing//$'\n'/, }"
         need_free_space
@@ -110,7 +114,8 @@ install_requirements() { # FINGERPRINT
         # A pip killed while it unpacks leaves packages that look whole: the marker makes the next
         # call start with a clean environment. A pip that failed while downloading left nothing.
         : >"$DIRTY"
-        run_logged pip "$VENV/bin/python" -m pip install --no-input --progress-bar off -r "$list" || status=$?
+        { run_logged pip "${pip[@]}" -r "${lists[0]}" &&
+            run_logged pip "${pip[@]}" --no-deps -r "${lists[1]}"; } || status=$?
         if ((status)); then
             grep -q '^Installing collected packages' "$LOG_DIR/pip.log" || rm -f -- "$DIRTY"
             die_with_log "$E_DOWNLOAD" pip 'installing Python packages failed'

@@ -177,8 +177,10 @@ class Door:
                 seen.append("apt")
             elif "-m venv" in line:
                 seen.append("venv")
-            elif "-m pip install" in line:
-                seen.append("build" if "--no-deps" in line else "pip")
+            elif "--no-index" in line:
+                seen.append("build")
+            elif "-m pip install" in line and "--no-deps" not in line:  # the latter follows it
+                seen.append("pip")
         log.write_text("")
         return seen
 
