@@ -279,7 +279,7 @@ def test_killed_set_up_is_repaired_by_the_next_call(door: Door) -> None:
 def test_help_lists_the_verbs_and_needs_no_set_up(door: Door) -> None:
     done = door.run("--help")
     assert done.returncode == 0
-    for verb in ("demo", "test", "bench", "lint", "setup", "run, simulate, evaluate"):
+    for verb in ("demo", "test", "bench", "lint", "setup", "run, simulate, evaluate, params"):
         assert f"\n  {verb}" in done.stdout
     assert door.calls() == []
 
