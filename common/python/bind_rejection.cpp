@@ -2,6 +2,8 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include <nanobind/stl/string.h>
 
+#include <cmath>
+
 #include "arrays.hpp"
 #include "d2lio/rejection/rejector.hpp"
 #include "modules.hpp"
@@ -12,8 +14,17 @@ namespace {
 
 using namespace nb::literals;
 
+void positive(const char* key, double value) {
+    if (!(value > 0.0) || !std::isfinite(value)) {
+        throw ConfigError(key, std::to_string(value), "a finite number > 0");
+    }
+}
+
 Rejector make_rejector(const std::map<std::string, std::string>& params, double map_voxel) {
-    return {configured<RejectionConfig>(params), map_voxel};
+    positive("map_voxel", map_voxel);
+    const auto config = configured<RejectionConfig>(params);
+    config.validate();
+    return {config, map_voxel};
 }
 
 }  // namespace
@@ -24,6 +35,11 @@ void bind_rejection(nb::module_& m) {
         .def(
             "__init__",
             [](KissRejection* self, double sigma_0, double delta_min, double r_max) {
+                positive("sigma_0", sigma_0);
+                positive("r_max", r_max);
+                if (!(delta_min >= 0.0)) {
+                    throw ConfigError("delta_min", std::to_string(delta_min), ">= 0");
+                }
                 new (self) KissRejection{sigma_0, delta_min, r_max};
             },
             "sigma_0"_a = 2.0, "delta_min"_a = 0.1, "r_max"_a = 100.0)

@@ -4,6 +4,10 @@
 #include <nanobind/stl/optional.h>
 #include <nanobind/stl/string.h>
 
+#include <cmath>
+#include <mutex>
+#include <stdexcept>
+
 #include "../../common/python/arrays.hpp"
 #include "../../common/python/errors.hpp"
 #include "d2lio/fastlio/host.hpp"
@@ -15,42 +19,82 @@ using namespace nb::literals;
 using fastlio::Host;
 using fastlio::ScanResult;
 
-void add_imu(Host& host, const Array<std::int64_t>& stamps, const Vectors& gyro,
-             const Vectors& accel) {
+/// A host that any number of Python threads may call: the interpreter's lock is given up first, so
+/// that a long step() holds nobody else, and calls take turns.
+class SharedHost {
+  public:
+    SharedHost(const fastlio::ParamMap& params, int threads) : host_(params, threads) {}
+
+    template <typename F>
+    auto call(const F& f) {
+        nb::gil_scoped_release release;
+        const std::lock_guard lock(mutex_);
+        return f(host_);
+    }
+
+  private:
+    std::mutex mutex_;
+    Host host_;
+};
+
+[[noreturn]] void refuse_after_finish() {
+    throw std::runtime_error("the host has been told that no more data will come (finish)");
+}
+
+std::size_t add_imu(SharedHost& shared, const Array<std::int64_t>& stamps, const Vectors& gyro,
+                    const Vectors& accel) {
     const std::size_t n = stamps.shape(0);
     if (gyro.shape(0) != n || accel.shape(0) != n) {
         throw nb::value_error("stamps, gyro and accel differ in length");
     }
-    nb::gil_scoped_release release;
-    for (std::size_t i = 0; i < n; ++i) {
-        host.add_imu({stamps.data()[i], Eigen::Map<const Vec3>(gyro.data() + 3 * i),
-                      Eigen::Map<const Vec3>(accel.data() + 3 * i)});
-    }
+    return shared.call([&](Host& host) {
+        std::size_t accepted = 0;
+        for (std::size_t i = 0; i < n; ++i) {
+            const PushStatus status =
+                host.add_imu({stamps.data()[i], Eigen::Map<const Vec3>(gyro.data() + 3 * i),
+                              Eigen::Map<const Vec3>(accel.data() + 3 * i)});
+            if (status == PushStatus::kFinished) refuse_after_finish();
+            const bool taken = status == PushStatus::kAccepted || status == PushStatus::kNewEpoch ||
+                               status == PushStatus::kQueueFullDropped;
+            accepted += taken ? 1 : 0;
+        }
+        return accepted;
+    });
 }
 
-void add_scan(Host& host, Stamp stamp, const Points& xyz, const Array<std::int32_t>& dt_ns,
-              const std::optional<Array<float>>& intensity,
-              const std::optional<Array<std::uint16_t>>& ring) {
+const char* push_name(PushStatus status) {
+    const char* const names[] = {"accepted",  "late_dropped", "duplicate_dropped",
+                                 "bad_value", "new_epoch",    "queue_full_dropped",
+                                 "finished"};
+    return names[static_cast<std::size_t>(status)];
+}
+
+const char* add_scan(SharedHost& shared, Stamp stamp, const Points& xyz,
+                     const Array<std::int32_t>& dt_ns, const std::optional<Array<float>>& intensity,
+                     const std::optional<Array<std::uint16_t>>& ring) {
     const std::size_t n = xyz.shape(0);
     if (dt_ns.shape(0) != n || (intensity && intensity->shape(0) != n) ||
         (ring && ring->shape(0) != n)) {
         throw nb::value_error("xyz, dt_ns, intensity and ring differ in length");
     }
-    nb::gil_scoped_release release;
-    Scan scan;
-    scan.stamp = stamp;
-    scan.points.resize(n);
-    for (std::size_t i = 0; i < n; ++i) {
-        LidarPoint& p = scan.points[i];
-        const float* q = xyz.data() + 3 * i;
-        p.x = q[0];
-        p.y = q[1];
-        p.z = q[2];
-        p.dt_ns = dt_ns.data()[i];
-        if (intensity) p.intensity = intensity->data()[i];
-        if (ring) p.ring = ring->data()[i];
-    }
-    host.add_scan(std::move(scan));
+    return shared.call([&](Host& host) {
+        Scan scan;
+        scan.stamp = stamp;
+        scan.points.resize(n);
+        for (std::size_t i = 0; i < n; ++i) {
+            LidarPoint& p = scan.points[i];
+            const float* q = xyz.data() + 3 * i;
+            p.x = q[0];
+            p.y = q[1];
+            p.z = q[2];
+            p.dt_ns = dt_ns.data()[i];
+            if (intensity) p.intensity = intensity->data()[i];
+            if (ring) p.ring = ring->data()[i];
+        }
+        const PushStatus status = host.add_scan(std::move(scan));
+        if (status == PushStatus::kFinished) refuse_after_finish();
+        return push_name(status);
+    });
 }
 
 nb::dict diagnostics(const ScanResult& r) {
@@ -78,8 +122,8 @@ Eigen::Matrix4d T_map_imu(const ScanResult& r) {
     return T;
 }
 
-nb::dict counts(const Host& host) {
-    const auto c = host.counts();
+nb::dict counts(SharedHost& shared) {
+    const auto c = shared.call([](Host& host) { return host.counts(); });
     nb::dict out;
     const std::pair<const char*, std::size_t> entries[] = {
         {"imu_accepted", c.sync.imu_accepted},
@@ -164,26 +208,42 @@ NB_MODULE(_fastlio, m) {
     m.doc() = "FAST-LIO2-equivalent host of D2-LIO.";
     translate_config_error();
     bind_result(m);
-    nb::class_<Host>(m, "FastLioHost", "LiDAR-inertial odometry that behaves like FAST-LIO2.")
+    nb::class_<SharedHost>(
+        m, "FastLioHost",
+        "LiDAR-inertial odometry that behaves like FAST-LIO2. Calls from several "
+        "threads take turns.")
         .def(nb::init<const fastlio::ParamMap&, int>(), "params"_a = fastlio::ParamMap{},
              "threads"_a = 1, "Raises ConfigError (key, value, allowed) for anything unusable.")
         .def_static("describe", &describe, "Every parameter: key, type, default, range, unit, doc.")
-        .def("add_imu", &add_imu, "stamps"_a, "gyro"_a, "accel"_a,
-             "int64 [N] ns; float64 [N, 3] rad/s; float64 [N, 3] m/s^2.")
-        .def("add_scan", &add_scan, "stamp"_a, "xyz"_a, "dt_ns"_a,
+        .def("add_imu", &add_imu, "stamps"_a.noconvert(), "gyro"_a, "accel"_a,
+             "int64 [N] ns; float64 [N, 3] rad/s; float64 [N, 3] m/s^2. Returns how many were "
+             "accepted. Stamps of another type are refused, not converted.")
+        .def("add_scan", &add_scan, "stamp"_a, "xyz"_a, "dt_ns"_a.noconvert(),
              "intensity"_a.none() = nb::none(), "ring"_a.none() = nb::none(),
-             "stamp ns; float32 [N, 3] m, LiDAR frame; int32 [N] ns after stamp.")
-        .def("step", &Host::step, nb::call_guard<nb::gil_scoped_release>(),
-             "Processes the next complete scan; None when more data is needed.")
-        .def("finish", &Host::finish, "No more data will come.")
+             "stamp ns; float32 [N, 3] m, LiDAR frame; int32 [N] ns after stamp (not converted). "
+             "Returns what became of it: accepted, late_dropped, ...")
         .def(
-            "map_points", [](const Host& h) { return to_numpy(h.map_points()); },
+            "step", [](SharedHost& h) { return h.call([](Host& host) { return host.step(); }); },
+            "Processes the next complete scan; None when more data is needed.")
+        .def(
+            "finish", [](SharedHost& h) { h.call([](Host& host) { host.finish(); }); },
+            "No more data will come.")
+        .def(
+            "map_points",
+            [](SharedHost& h) {
+                return to_numpy(h.call([](Host& host) { return host.map_points(); }));
+            },
             nb::rv_policy::automatic, "float32 [N, 3], map frame, m")
         .def("counts", &counts, "What was refused or lost, by reason.")
         .def(
-            "sync_message", [](const Host& h) { return to_string(h.sync_report()); },
+            "sync_message",
+            [](SharedHost& h) {
+                return to_string(h.call([](Host& host) { return host.sync_report(); }));
+            },
             "Whether data flow, and if not, why.")
-        .def_prop_ro("map_bytes", &Host::map_bytes);
+        .def_prop_ro("map_bytes", [](SharedHost& h) {
+            return h.call([](Host& host) { return host.map_bytes(); });
+        });
 }
 
 }  // namespace d2lio::python

@@ -107,9 +107,7 @@ TEST(Adapter, ModesSwitchTheHostsDistanceGatesOff) {
     Correspondence m{};
     a.begin_scan(Scene().input());
     EXPECT_EQ(a.accept(far.candidate(0), &m), Verdict::kAccepted);
-    EXPECT_EQ(a.max_search_sq_distance(), std::numeric_limits<float>::infinity());
     a.set("rejection.keep_host_gate", "true");
-    EXPECT_EQ(a.max_search_sq_distance(), 5.F);
     a.begin_scan(Scene().input());
     EXPECT_EQ(a.accept(far.candidate(0), &m), Verdict::kFarNeighbours);
 }
@@ -157,6 +155,48 @@ TEST(Adapter, SingularPlanesHaveTheirOwnReason) {
     EXPECT_EQ(a.accept(line.candidate(0), &m), Verdict::kSingularPlane);
     a.end_scan(Scene().view(), true, nullptr, 0);
     EXPECT_EQ(a.diagnostics().counts.singular_plane, 1);
+}
+
+TEST(Adapter, BadCallsAreRefusedWithoutHarm) {
+    Adapter a;
+    EXPECT_FALSE(a.set(nullptr, "1"));
+    EXPECT_FALSE(a.set("rejection.tau", nullptr));
+    EXPECT_FALSE(a.set_map_voxel(-1.0));
+    EXPECT_EQ(a.param(10000).key, nullptr);
+    EXPECT_EQ(a.diagnostics_name(10000), nullptr);
+    EXPECT_TRUE(std::isnan(a.diagnostics_value(10000)));
+    ScanInput in = Scene().input();
+    in.covariance = nullptr;
+    EXPECT_EQ(a.begin_scan(in), Status::kBadInput);
+    in = Scene().input();
+    in.rotation_index = 21;
+    EXPECT_EQ(a.begin_scan(in), Status::kBadInput);
+    EXPECT_TRUE(a.check());
+    a.set("rejection.mode", "point_adaptive");
+    a.set("rejection.motion", "deviation");
+    a.set("rejection.epsilon_0", "0");
+    EXPECT_FALSE(a.check());
+    EXPECT_NE(std::string(a.error()).find("epsilon_0"), std::string::npos);
+}
+
+TEST(Adapter, BadInputFallsBackToTheHostsGatesAndIsNotTheLastScan) {
+    Adapter a;
+    a.set("rejection.mode", "fixed");
+    a.set("rejection.tau", "0.01");
+    Patch patch;
+    patch.lift(2.F);
+    Correspondence m{};
+    Scene s;
+    a.begin_scan(s.input());
+    EXPECT_EQ(a.accept(patch.candidate(0), &m), Verdict::kThreshold);
+    a.end_scan(s.view(), true, nullptr, 0);
+    Scene bad;
+    bad.P(0, 0) = std::numeric_limits<double>::infinity();
+    EXPECT_EQ(a.begin_scan(bad.input()), Status::kBadInput);
+    EXPECT_EQ(a.accept(patch.candidate(0), &m), Verdict::kAccepted);
+    a.end_scan(s.view(), true, nullptr, 0);
+    EXPECT_EQ(a.diagnostics().counts.threshold, 0);
+    EXPECT_EQ(a.diagnostics().counts.accepted, 1);
 }
 
 TEST(Adapter, NaNInputRunsWithoutThePlugIn) {

@@ -45,6 +45,14 @@ TEST(Host, StartsAsFastLio2Does) {
     EXPECT_TRUE(results[2].has_pose);
 }
 
+TEST(Host, EstimatesTheExtrinsicOnline) {
+    const auto results = test::run({{"mapping.extrinsic_est_en", "true"}});
+    EXPECT_LT(test::largest_error(results), kRoomError);
+    const Pose truth = test::SyntheticRoom::T_imu_lidar();
+    EXPECT_LT((results.back().state.extrinsic_pos - truth.t).norm(), 0.02);
+    EXPECT_NE(results.back().state.extrinsic_pos, truth.t);
+}
+
 TEST(Host, ResultsDoNotDependOnTheThreadCountAndRepeat) {
     for (const char* mode : kModes) {
         const ParamMap params{{"rejection.mode", mode}, {"degeneracy.method", "paper"}};
@@ -138,7 +146,12 @@ TEST(HostConfig, RefusesWhatCannotWork) {
     refused({{"max_iteration", "0"}}, "max_iteration");
     refused({{"preprocess.blind", "10"}, {"preprocess.max_range", "5"}}, "preprocess.max_range");
     refused({{"mapping.extrinsic_R", "1 0 0 0 1 0 0 0 -1"}}, "mapping.extrinsic_R");
-    refused({{"cube_side_length", "100"}}, "cube_side_length");
+    refused({{"degeneracy.w", "inf"}}, "degeneracy.w");
+    refused({{"imu.gap_reset", "0"}}, "imu.gap_reset");
+    refused({{"rejection.mode", "point_adaptive"},
+             {"rejection.motion", "deviation"},
+             {"rejection.epsilon_0", "0"}},
+            "parameters");
     refused({}, "threads", 0);
 }
 

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <limits>
+#include <random>
 
 #include "drive.hpp"
 
@@ -125,6 +126,36 @@ TEST(HostFaults, AShortImuGapIsToldAndSurvived) {
     EXPECT_EQ(r.results.back().status, ScanStatus::kOk);
 }
 
+TEST(HostFaults, AnImuGapLoosensThePrediction) {
+    const auto velocity_variance = [](double gap_s) {
+        SyntheticRoom room;
+        Host host(test::room_params({{"imu.gap_warn", "0.05"}}));
+        std::vector<ScanResult> results;
+        Drive drive;
+        drive.scans = 22;
+        drive.keep_imu = [gap_s](ImuSample& s) {
+            const double t = seconds_between(s.stamp, SyntheticRoom::kStart);
+            return t <= 2.0 || t > 2.0 + gap_s;
+        };
+        drive.edit = [](int i, Scan& s) {  // no points: the pose is the prediction
+            if (i >= 20) s.points.resize(2);
+            return true;
+        };
+        drive.feed(host, room, results);
+        return host.covariance().block<3, 3>(StateIndex::kVel, StateIndex::kVel).trace();
+    };
+    EXPECT_GT(velocity_variance(0.15), 2.0 * velocity_variance(0.0));
+}
+
+TEST(HostFaults, ALongLidarGapStartsAnew) {
+    Drive drive;
+    drive.scans = 60;
+    drive.edit = [](int i, Scan&) { return i < 20 || i > 40; };
+    const Outcome r = run(drive, {{"lidar.gap_reset", "1.5"}});
+    EXPECT_EQ(r.counts.resets, 1U);
+    EXPECT_EQ(r.results.back().status, ScanStatus::kOk);
+}
+
 TEST(HostFaults, ALongImuGapStartsAnew) {
     Drive drive;
     drive.scans = 60;
@@ -151,6 +182,17 @@ TEST(HostFaults, ImuInUnitsOfGIsToldAndScaled) {
     Drive drive;
     drive.keep_imu = [](ImuSample& s) {
         s.accel /= 9.81;
+        return true;
+    };
+    const Outcome r = run(drive);
+    EXPECT_FALSE(r.results[1].message.empty());
+    EXPECT_LT(test::largest_error(r.results), kRoomError);
+}
+
+TEST(HostFaults, AnImplausibleScaleIsToldAndNormalised) {
+    Drive drive;
+    drive.keep_imu = [](ImuSample& s) {
+        s.accel *= 1.15;
         return true;
     };
     const Outcome r = run(drive);
@@ -228,9 +270,9 @@ TEST(HostFaults, OfflineRunsLoseNothing) {
 
 TEST(HostFaults, UnsortedPointsAreAccepted) {
     Drive drive;
-    drive.edit = [](int, Scan& s) {  // ring by ring, as some drivers order them
-        std::stable_sort(s.points.begin(), s.points.end(),
-                         [](const LidarPoint& a, const LidarPoint& b) { return a.ring < b.ring; });
+    std::mt19937 engine(5);
+    drive.edit = [&engine](int, Scan& s) {
+        std::shuffle(s.points.begin(), s.points.end(), engine);
         return true;
     };
     EXPECT_LT(test::largest_error(run(drive).results), kRoomError);

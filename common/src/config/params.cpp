@@ -4,9 +4,11 @@
 
 #include <algorithm>
 #include <cctype>
+#include <charconv>
 #include <cmath>
-#include <cstdlib>
+#include <locale>
 #include <sstream>
+#include <system_error>
 #include <utility>
 
 namespace d2lio {
@@ -14,6 +16,7 @@ namespace {
 
 std::string format_number(double v) {
     std::ostringstream out;
+    out.imbue(std::locale::classic());
     out.precision(12);
     out << v;
     return out.str();
@@ -36,9 +39,9 @@ std::string trim(const std::string& s) {
 /// Parses one number that fills the whole text; infinity only where the range is open there.
 double parse_number(const std::string& key, const std::string& text, const Range& range) {
     const std::string s = trim(text);
-    char* end = nullptr;
-    const double v = std::strtod(s.c_str(), &end);
-    const bool whole = !s.empty() && end == s.c_str() + s.size();
+    double v = 0.0;  // from_chars: the same in every locale
+    const auto [end, fault] = std::from_chars(s.data(), s.data() + s.size(), v);
+    const bool whole = fault == std::errc() && end == s.data() + s.size() && !s.empty();
     const bool open_end = std::isinf(v) && v > 0 && range.max == kInf;
     if (!whole || std::isnan(v) || (std::isinf(v) && !open_end) || v < range.min || v > range.max) {
         throw ConfigError(key, text, "a number, " + format_range(range));

@@ -2,7 +2,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "d2lio/degeneracy/policies.hpp"
 
-#include <Eigen/LU>
 #include <algorithm>
 #include <cmath>
 
@@ -23,8 +22,9 @@ Mat3 congruence_weight(const BlockSpectrum& s, const Mat3& P, double lambda_min)
 }
 
 Mat3 literal_weight(const BlockSpectrum& s, const Mat3& P, double lambda_min) {
-    const Mat3 information = s.apply([lambda_min](double l) { return std::max(l, lambda_min); });
-    const Mat3 W = decompose(P).apply(inverse) * information.inverse();  // (A^T A P)^-1
+    const Mat3 inverse_information =
+        s.apply([lambda_min](double l) { return 1.0 / std::max(l, lambda_min); });
+    const Mat3 W = decompose(P).apply(inverse) * inverse_information;  // (A^T A P)^-1
     return decompose(0.5 * (W + W.transpose())).apply([](double l) { return std::max(l, 0.0); });
 }
 

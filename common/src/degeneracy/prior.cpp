@@ -28,14 +28,14 @@ void DegeneracyConfig::bind(ParamTable& table) {
               "prior in the degeneracy slot");
     table.add("degeneracy.form", form, {"congruence", "paper"},
               "weight of method paper: symmetric congruence or the literal product");
-    table.add("degeneracy.w", w, {0.0, kInf}, "", "strength of method paper");
-    table.add("degeneracy.lambda_min", lambda_min, {1e-9, kInf}, "points or m^2",
+    table.add("degeneracy.w", w, {0.0, 1e9}, "", "strength of method paper");
+    table.add("degeneracy.lambda_min", lambda_min, {1e-9, 1e9}, "points or m^2",
               "eigenvalues are raised to this (method paper)");
     table.add("degeneracy.inflate_only", inflate_only,
               "the kept covariance does not claim the prior a second time");
-    table.add("degeneracy.threshold_r", threshold_r, {0.0, kInf}, "m^2",
+    table.add("degeneracy.threshold_r", threshold_r, {0.0, 1e9}, "m^2",
               "rotation eigenvalue below which method remap keeps the prediction");
-    table.add("degeneracy.threshold_t", threshold_t, {0.0, kInf}, "points",
+    table.add("degeneracy.threshold_t", threshold_t, {0.0, 1e9}, "points",
               "translation eigenvalue below which method remap keeps the prediction");
     table.add("degeneracy.weak_share", weak_share, {0.0, 1.0 / 3.0}, "",
               "a direction whose eigenvalue is below this share of the trace is reported as weak");

@@ -55,6 +55,8 @@ Columns ScanDiagnostics::columns() const {
     add_vector("lambda_t", lambda_t, out);
     add_axis("v_r_1", v_r.col(0), out);
     add_axis("v_t_1", v_t.col(0), out);
+    add_axis("v_r_2", v_r.col(1), out);
+    add_axis("v_t_2", v_t.col(1), out);
     add_vector("prior_r", prior_r, out);
     add_vector("prior_t", prior_t, out);
     out.emplace_back("weak_r", weak_r);

@@ -33,16 +33,24 @@ void RejectionConfig::bind(ParamTable& table) {
               "strategy; off leaves the host's own gates alone");
     table.add("rejection.keep_host_gate", keep_host_gate,
               "keep the host's own distance gates on top of the strategy");
-    table.add("rejection.tau", tau, {0.0, kInf}, "m", "threshold of mode fixed");
-    table.add("rejection.sigma_0", sigma_0, {1e-6, kInf}, "m", "first sigma of mode kiss");
-    table.add("rejection.delta_min", delta_min, {0.0, kInf}, "m",
+    table.add("rejection.tau", tau, {0.0, 1e6}, "m", "threshold of mode fixed");
+    table.add("rejection.sigma_0", sigma_0, {1e-6, 1e6}, "m", "first sigma of mode kiss");
+    table.add("rejection.delta_min", delta_min, {0.0, 1e6}, "m",
               "smaller deviations do not enter sigma (mode kiss)");
-    table.add("rejection.r_max", r_max, {0.0, kInf}, "m",
+    table.add("rejection.r_max", r_max, {0.0, 1e6}, "m",
               "range at which rotation counts (mode kiss)");
-    table.add("rejection.epsilon_0", epsilon_0, {0.0, kInf}, "m",
+    table.add("rejection.epsilon_0", epsilon_0, {0.0, 1e6}, "m",
               "floor of mode point_adaptive; auto is the map's voxel size, 0 the literal paper");
     table.add("rejection.motion", motion, {"predicted", "deviation"},
               "motion that opens the threshold of mode point_adaptive");
+}
+
+void RejectionConfig::validate() const {
+    using Motion = PointAdaptiveRejection::Motion;
+    if (mode == RejectionMode::kPointAdaptive && motion == Motion::kDeviation && epsilon_0 == 0.0) {
+        // Nothing accepted means no deviation, which means nothing accepted.
+        throw ConfigError("rejection.epsilon_0", "0", "> 0 with rejection.motion deviation");
+    }
 }
 
 Rejector::Rejector(const RejectionConfig& config, double map_voxel)

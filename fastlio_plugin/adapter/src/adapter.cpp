@@ -48,6 +48,7 @@ struct Adapter::Impl {
     std::string error;
 
     Rejector rejector{rejection, map_voxel};
+    const Rejector host_gates{RejectionConfig{}, map_voxel};  ///< mode off
     DirectionalPrior prior{degeneracy};
     Gate gate;
     ScanDiagnostics current, last;
@@ -69,6 +70,9 @@ struct Adapter::Impl {
         rejector = Rejector(rejection, map_voxel);
         prior = DirectionalPrior(degeneracy);
     }
+    Status read(const ScanInput& input);
+    void copy_rows(const PriorRows& rows);
+    void publish();
     void keep_spectrum(const Spectrum& s, const PriorTerm& term);
     void keep_corrections(const Pose& posterior);
     Status remove_prior(double* covariance, int size) const;
@@ -129,10 +133,24 @@ Adapter::Adapter() : impl_(std::make_unique<Impl>()) {}
 Adapter::~Adapter() = default;
 
 bool Adapter::set(const char* key, const char* value) {
+    if (key == nullptr || value == nullptr) {
+        impl_->error = "key or value missing";
+        return false;
+    }
     try {
         impl_->table.set(key, value);
         impl_->rebuild();
         impl_->error.clear();
+        return true;
+    } catch (const std::exception& e) {
+        impl_->error = e.what();
+        return false;
+    }
+}
+
+bool Adapter::check() {
+    try {
+        impl_->rejection.validate();
         return true;
     } catch (const ConfigError& e) {
         impl_->error = e.what();
@@ -144,22 +162,40 @@ const char* Adapter::error() const { return impl_->error.c_str(); }
 std::size_t Adapter::param_count() const { return impl_->docs.size(); }
 
 ParamDoc Adapter::param(std::size_t i) const {
-    const ParamInfo& d = impl_->docs.at(i);
+    if (i >= impl_->docs.size()) return {};
+    const ParamInfo& d = impl_->docs[i];
     return {d.key.c_str(),   d.type.c_str(), d.default_value.c_str(),
             d.range.c_str(), d.unit.c_str(), d.doc.c_str()};
 }
 
-void Adapter::set_map_voxel(double size) {
+bool Adapter::set_map_voxel(double size) {
+    if (!(size > 0.0) || !std::isfinite(size)) {
+        impl_->error = "the map's voxel size must be positive";
+        return false;
+    }
     impl_->map_voxel = size;
     impl_->rebuild();
+    return true;
 }
 
 bool Adapter::rejects() const { return impl_->rejector.active(); }
 bool Adapter::has_prior() const { return impl_->prior.active(); }
 
-float Adapter::max_search_sq_distance() const {
-    return impl_->rejector.host_gates() ? GateConstants::kMaxSqDistance
-                                        : std::numeric_limits<float>::infinity();
+/// Copies what later calls need. The views are not kept.
+Status Adapter::Impl::read(const ScanInput& in) {
+    const int n = in.covariance_size;
+    const auto fits = [n](int index) { return index >= 0 && index + 3 <= n; };
+    if (in.covariance == nullptr || !fits(in.position_index) || !fits(in.rotation_index)) {
+        return Status::kBadInput;
+    }
+    predicted = to_pose(in.predicted);
+    position_index = in.position_index;
+    rotation_index = in.rotation_index;
+    const Eigen::Map<const Eigen::MatrixXd> P(in.covariance, n, n);
+    P_t = P.block<3, 3>(position_index, position_index);
+    P_r = P.block<3, 3>(rotation_index, rotation_index);
+    const bool usable = finite(predicted) && P_t.allFinite() && P_r.allFinite();
+    return usable ? Status::kOk : Status::kBadInput;
 }
 
 Status Adapter::begin_scan(const ScanInput& input) {
@@ -168,17 +204,9 @@ Status Adapter::begin_scan(const ScanInput& input) {
     m.rows = PriorBlock{};
     m.gate.begin_scan(input.points);
     m.in_scan = false;
-    m.predicted = to_pose(input.predicted);
     const Pose previous = to_pose(input.previous);
-    const Eigen::Map<const Eigen::MatrixXd> P(input.covariance, input.covariance_size,
-                                              input.covariance_size);
-    m.position_index = input.position_index;
-    m.rotation_index = input.rotation_index;
-    m.P_t = P.block<3, 3>(input.position_index, input.position_index);
-    m.P_r = P.block<3, 3>(input.rotation_index, input.rotation_index);
-    if (!finite(previous) || !finite(m.predicted) || !m.P_t.allFinite() || !m.P_r.allFinite()) {
-        return Status::kBadInput;
-    }
+    const Status status = m.read(input);
+    if (status != Status::kOk || !finite(previous)) return Status::kBadInput;
     m.in_scan = true;
     m.rejector.begin_scan(previous.inverse() * m.predicted);
     m.current.sigma = m.rejector.sigma();
@@ -186,7 +214,18 @@ Status Adapter::begin_scan(const ScanInput& input) {
 }
 
 Verdict Adapter::accept(const Candidate& candidate, Correspondence* out) {
-    return impl_->gate.accept(candidate, impl_->rejector, out);
+    return impl_->gate.accept(candidate, impl_->in_scan ? impl_->rejector : impl_->host_gates, out);
+}
+
+void Adapter::Impl::copy_rows(const PriorRows& p) {
+    for (int i = 0; i < p.count; ++i) {
+        for (int j = 0; j < 3; ++j) {
+            rows.jacobian[i][j] = p.translation(i, j);
+            rows.jacobian[i][3 + j] = p.rotation(i, j);
+        }
+        rows.residual[i] = p.residual[i];
+    }
+    rows.count = p.count;
 }
 
 Status Adapter::condition(const Rows& rows, const PoseView& pose, double variance,
@@ -208,30 +247,27 @@ Status Adapter::condition(const Rows& rows, const PoseView& pose, double varianc
     const Pose x = to_pose(pose);
     if (!term.adds_prior || !finite(x)) return Status::kOk;
     const Vec3 e_r = log_so3(m.predicted.R.transpose() * x.R);
-    const PriorRows p = make_prior_rows(term, e_r, x.t - m.predicted.t, variance);
-    for (int i = 0; i < p.count; ++i) {
-        for (int j = 0; j < 3; ++j) {
-            m.rows.jacobian[i][j] = p.translation(i, j);
-            m.rows.jacobian[i][3 + j] = p.rotation(i, j);
-        }
-        m.rows.residual[i] = p.residual[i];
-    }
-    m.rows.count = p.count;
+    m.copy_rows(make_prior_rows(term, e_r, x.t - m.predicted.t, variance));
     m.variance = variance;
     *prior = m.rows;
     return Status::kOk;
 }
 
+void Adapter::Impl::publish() {
+    current.counts = gate.counts();
+    gate.threshold_statistics(current);
+    last = current;
+    columns = last.columns();
+}
+
 Status Adapter::end_scan(const PoseView& posterior, bool converged, double* covariance, int size) {
     Impl& m = *impl_;
-    if (!m.in_scan) return Status::kNoScan;
+    const bool in_scan = m.in_scan;
     m.in_scan = false;
-    m.current.counts = m.gate.counts();
-    m.gate.threshold_statistics(m.current);
     m.current.converged = converged;
     const Pose x = to_pose(posterior);
-    Status status = Status::kBadInput;
-    if (finite(x)) {
+    Status status = in_scan ? Status::kBadInput : Status::kNoScan;
+    if (in_scan && finite(x)) {
         status = Status::kOk;
         m.rejector.end_scan(m.predicted.inverse() * x);
         m.keep_corrections(x);
@@ -239,8 +275,7 @@ Status Adapter::end_scan(const PoseView& posterior, bool converged, double* cova
             status = m.remove_prior(covariance, size);
         }
     }
-    m.last = m.current;
-    m.columns = m.last.columns();
+    m.publish();
     return status;
 }
 
@@ -251,9 +286,11 @@ void Adapter::reset() {
 
 std::size_t Adapter::diagnostics_size() const { return impl_->columns.size(); }
 const char* Adapter::diagnostics_name(std::size_t i) const {
-    return impl_->columns.at(i).first.c_str();
+    return i < impl_->columns.size() ? impl_->columns[i].first.c_str() : nullptr;
 }
-double Adapter::diagnostics_value(std::size_t i) const { return impl_->columns.at(i).second; }
+double Adapter::diagnostics_value(std::size_t i) const {
+    return i < impl_->columns.size() ? impl_->columns[i].second : kNaN;
+}
 const ScanDiagnostics& Adapter::diagnostics() const { return impl_->last; }
 
 }  // namespace d2lio::fastlio

@@ -14,7 +14,8 @@ void HostConfig::bind(ParamTable& t) {
     t.add("filter_size_surf", filter_size_surf, {0.01, 100.0}, "m", "voxel size of the scan");
     t.add("filter_size_map", filter_size_map, {0.01, 100.0}, "m", "voxel size of the map");
     t.add("max_iteration", max_iteration, {1, 100}, "", "iterations of the filter update");
-    t.add("cube_side_length", cube_side_length, {1.0, 1e6}, "m", "side of the map's box");
+    t.add("cube_side_length", cube_side_length, {1.0, 1e6}, "m",
+          "side of the map's box; up to 3 det_range it would never rest and is made 4 det_range");
     t.add("mapping.det_range", det_range, {1.0, 1e5}, "m",
           "range of the LiDAR; the map's box moves at 1.5 times this from its faces");
     t.add("mapping.acc_cov", noise.accel, {1e-12, 1e6}, "(m/s^2)^2", "accelerometer noise");
@@ -28,8 +29,14 @@ void HostConfig::bind(ParamTable& t) {
     t.add("mapping.exact_jacobians", exact_jacobians,
           "exact rotation blocks where FAST-LIO2's filter uses the identity");
     t.add("imu.init_samples", init_samples, {2, 10000}, "", "samples averaged at the start");
-    t.add("imu.gap_reset", imu_gap_reset, {0.0, kInf}, "s",
+    t.add("imu.gap_warn", sync.imu_gap_warn_s, {0.001, kInf}, "s",
+          "a longer gap in the IMU data (and 3 periods) is told and makes the prediction looser");
+    t.add("imu.gap_reset", imu_gap_reset, {0.05, kInf}, "s",
           "a longer gap in the IMU data starts a new epoch");
+    t.add("lidar.gap_warn", sync.lidar_gap_warn_s, {0.001, kInf}, "s",
+          "a longer gap in the LiDAR data is told");
+    t.add("lidar.gap_reset", lidar_gap_reset, {0.5, kInf}, "s",
+          "a longer gap in the LiDAR data starts a new epoch");
     t.add("live", live, "bounded queues: drop the oldest scan rather than fall behind");
     t.add("map.background_rebuild", background_rebuild,
           "rebalance the map in a second thread (runs no longer repeat bit for bit)");
@@ -41,6 +48,10 @@ Pose HostConfig::extrinsic() const {
                              Eigen::Map<const Vec3>(extrinsic_T), "mapping.extrinsic_R");
 }
 
+double HostConfig::box_side() const {
+    return cube_side_length > 3.0 * det_range ? cube_side_length : 4.0 * det_range;
+}
+
 void HostConfig::validate() const {
     extrinsic();
     if (!(filter.max_range > filter.blind)) {
@@ -49,10 +60,6 @@ void HostConfig::validate() const {
     }
     if (threads < 1 || threads > 256) {
         throw ConfigError("threads", std::to_string(threads), "[1, 256]");
-    }
-    if (cube_side_length < 3.0 * det_range) {
-        throw ConfigError("cube_side_length", std::to_string(cube_side_length),
-                          "at least 3 x mapping.det_range = " + std::to_string(3.0 * det_range));
     }
 }
 

@@ -19,6 +19,8 @@ namespace {
 constexpr double kPointVariance = 0.001;  ///< m^2, FAST-LIO2's LASER_POINT_COV
 constexpr double kInitTime = 0.1;         ///< s, until then every point enters the map
 constexpr std::size_t kMinPoints = 5;     ///< down-sampled points a scan needs
+constexpr int kMaxFailures = 10;          ///< refused updates in a row before starting anew
+constexpr double kGapPeriods = 3.0;       ///< IMU periods that are no gap yet
 
 using Clock = std::chrono::steady_clock;
 
@@ -65,12 +67,13 @@ HostConfig configure(const ParamMap& params, int threads, Adapter& adapter) {
     }
     config.threads = threads;
     if (config.live) {
-        const ScanEndRule rule = config.sync.end_rule;
-        config.sync = SynchronizerOptions::online();
-        config.sync.end_rule = rule;
+        const SynchronizerOptions online = SynchronizerOptions::online();
+        config.sync.max_scans = online.max_scans;
+        config.sync.max_imu = online.max_imu;
     }
     config.validate();
     adapter.set_map_voxel(config.filter_size_map);
+    if (!adapter.check()) throw ConfigError("parameters", "their combination", adapter.error());
     return config;
 }
 
@@ -84,6 +87,16 @@ IeskfOptions filter_options(const HostConfig& c) {
 
 std::string gap_message(const char* sensor, double seconds) {
     return std::string(sensor) + " gap of " + std::to_string(seconds) + " s";
+}
+
+/// Whether a pushed scan waits to be processed.
+bool pending(PushStatus status) {
+    return status == PushStatus::kAccepted || status == PushStatus::kNewEpoch ||
+           status == PushStatus::kQueueFullDropped;
+}
+
+void say(ScanResult& r, const std::string& text) {
+    if (!text.empty()) r.message += (r.message.empty() ? "" : "; ") + text;
 }
 
 }  // namespace
@@ -126,6 +139,9 @@ class Host::Impl {
     void process(MeasureGroup& group, ScanResult& r);
     bool start_up(const MeasureGroup& group, ScanResult& r);
     void begin_epoch();
+    std::string reset_reason(const MeasureGroup& group) const;
+    double loosen(const MeasureGroup& group, ScanResult& r) const;
+    void judge(UpdateStatus status, ScanResult& r);
     bool predict(MeasureGroup& group, ScanResult& r);
     void start_map(ScanResult& r);
     void update(const Pose& previous, ScanResult& r);
@@ -134,6 +150,7 @@ class Host::Impl {
 
     std::deque<Arrival> arrivals_;
     bool first_scan_ = true;
+    int failures_ = 0;  ///< refused updates in a row
     Stamp first_begin_ = 0;
     std::vector<Eigen::Vector3f> cloud_, downsampled_;
     StopWatch watch_;
@@ -145,8 +162,8 @@ PushStatus Host::Impl::add_scan(Scan scan) {
     const Stamp stamp = scan.stamp;
     filtered_ += filter_.apply(scan.points);
     const PushStatus status = sync_.push_scan(std::move(scan));
-    if (status == PushStatus::kNewEpoch) arrivals_.clear();
-    arrivals_.push_back({stamp, raw, watch.lap()});
+    if (pending(status)) arrivals_.push_back({stamp, raw, watch.lap()});
+    while (arrivals_.size() > sync_.pending_scans()) arrivals_.pop_front();
     return status;
 }
 
@@ -164,6 +181,7 @@ void Host::Impl::recall_arrival(const MeasureGroup& group, ScanResult& r) {
 
 void Host::Impl::begin_epoch() {
     first_scan_ = true;
+    failures_ = 0;
     imu_.reset();
     map_.clear();
     adapter_.reset();
@@ -208,15 +226,24 @@ void Host::Impl::process(MeasureGroup& group, ScanResult& r) {
     if (r.status != ScanStatus::kNumericalFailure) grow_map(group, r);
 }
 
+/// Why the estimate cannot be carried over to this scan; empty if it can.
+std::string Host::Impl::reset_reason(const MeasureGroup& group) const {
+    if (group.new_epoch) return "stamps jumped back";
+    if (!imu_.initialised()) return {};
+    if (group.imu_gap_s > config_.imu_gap_reset) return gap_message("IMU", group.imu_gap_s);
+    if (group.lidar_gap_s > config_.lidar_gap_reset) return gap_message("LiDAR", group.lidar_gap_s);
+    if (failures_ >= kMaxFailures) return std::to_string(failures_) + " updates refused in a row";
+    return {};
+}
+
 /// Scans before the filter runs: the first is dropped, the next ones initialise gravity and bias.
 bool Host::Impl::start_up(const MeasureGroup& group, ScanResult& r) {
-    const bool gap = imu_.initialised() && group.imu_gap_s > config_.imu_gap_reset;
-    if (group.new_epoch || gap) {
+    const std::string reason = reset_reason(group);
+    if (!reason.empty()) {
         begin_epoch();
-        if (gap) ++resets_;
+        if (!group.new_epoch) ++resets_;
         r.new_epoch = true;
-        r.message = gap ? gap_message("IMU", group.imu_gap_s) + ": starting anew"
-                        : "stamps jumped back: starting anew";
+        say(r, reason + ": starting anew");
     }
     if (first_scan_) {
         first_scan_ = false;
@@ -227,24 +254,28 @@ bool Host::Impl::start_up(const MeasureGroup& group, ScanResult& r) {
     if (imu_.initialised()) return false;
     r.status =
         imu_.initialise(group.imu, x_, P_) ? ScanStatus::kInitialising : ScanStatus::kImuFault;
-    r.message = imu_.note();
+    say(r, imu_.note());
     return true;
 }
 
-bool Host::Impl::predict(MeasureGroup& group, ScanResult& r) {
-    const double warn = config_.sync.imu_gap_warn_s;
-    const bool gap = group.imu_gap_s > warn;
-    if (gap) r.message = gap_message("IMU", group.imu_gap_s);
+/// Tells gaps; factor (>= 1) on the process noise, growing with the length of an IMU gap.
+double Host::Impl::loosen(const MeasureGroup& group, ScanResult& r) const {
+    const double bound = std::max(config_.sync.imu_gap_warn_s, kGapPeriods * imu_.mean_period());
+    if (group.imu_gap_s > bound) say(r, gap_message("IMU", group.imu_gap_s));
     if (group.lidar_gap_s > config_.sync.lidar_gap_warn_s) {
-        r.message = gap_message("LiDAR", group.lidar_gap_s);
+        say(r, gap_message("LiDAR", group.lidar_gap_s));
     }
-    const auto& knots = imu_.propagate(group, gap ? 1.0 + group.imu_gap_s / warn : 1.0, x_, P_);
+    return std::max(1.0, group.imu_gap_s / bound);
+}
+
+bool Host::Impl::predict(MeasureGroup& group, ScanResult& r) {
+    const auto& knots = imu_.propagate(group, loosen(group, r), x_, P_);
     if (!x_.is_finite() || !P_.allFinite()) {
         begin_epoch();
         ++resets_;
         r.status = ScanStatus::kReset;
         r.new_epoch = true;
-        r.message = "prediction is not finite: starting anew";
+        say(r, "prediction is not finite: starting anew");
         return false;
     }
     deskew(group.scan.points, knots, x_.T_map_imu(), x_.T_imu_lidar());
@@ -257,6 +288,7 @@ bool Host::Impl::predict(MeasureGroup& group, ScanResult& r) {
 void Host::Impl::start_map(ScanResult& r) {
     if (downsampled_.size() <= kMinPoints) {
         r.status = ScanStatus::kTooFewPoints;
+        r.has_pose = false;
         return;
     }
     matcher_.begin(downsampled_, map_.tree());
@@ -281,27 +313,32 @@ void Host::Impl::update(const Pose& previous, ScanResult& r) {
             return matcher_.measure(x, search, out);
         });
     const bool updated = report.status == UpdateStatus::kOk;
-    adapter_.end_scan({x_.rot.data(), x_.pos.data()}, report.converged,
-                      updated ? P_.data() : nullptr, StateIndex::kSize);
+    const Status kept = adapter_.end_scan({x_.rot.data(), x_.pos.data()}, report.converged,
+                                          updated ? P_.data() : nullptr, StateIndex::kSize);
+    if (kept == Status::kSingular) say(r, "the covariance still claims the prior");
     r.diagnostics = adapter_.diagnostics();
     r.diagnostics.iterations = report.iterations;
+    judge(report.status, r);
+    r.times.search = matcher_.search_ms();
+    r.times.update = watch_.lap() - r.times.search;
+}
+
+void Host::Impl::judge(UpdateStatus status, ScanResult& r) {
+    failures_ = status == UpdateStatus::kNumericalFailure ? failures_ + 1 : 0;
     const bool weak = r.diagnostics.weak_r + r.diagnostics.weak_t > 0;
-    switch (report.status) {
+    switch (status) {
         case UpdateStatus::kOk:
             r.status = ScanStatus::kOk;
             r.health = weak ? Health::kDegenerate : Health::kOk;
-            break;
+            return;
         case UpdateStatus::kNoMeasurement:
             r.status = ScanStatus::kNoCorrespondence;
-            r.health = Health::kLost;
             break;
         case UpdateStatus::kNumericalFailure:
             r.status = ScanStatus::kNumericalFailure;
-            r.health = Health::kLost;
             break;
     }
-    r.times.search = matcher_.search_ms();
-    r.times.update = watch_.lap() - r.times.search;
+    r.health = Health::kLost;
 }
 
 void Host::Impl::grow_map(const MeasureGroup& group, ScanResult& r) {

@@ -41,6 +41,7 @@ bool Ieskf::tall_gain(const Mat23x23& P) {
 
 /// K = P H^T (H P H^T + r I)^-1: fewer rows than states.
 bool Ieskf::wide_gain(const Mat23x23& P) {
+    if (Eigen::LLT<Mat23x23>(P).info() != Eigen::Success) return false;
     const Eigen::MatrixXd H = rows_.H.topRows(rows_.rows);
     const Eigen::MatrixXd PHt = P.leftCols<12>() * H.transpose();
     const Eigen::MatrixXd S =
@@ -58,6 +59,15 @@ bool Ieskf::step(const Mat23x23& P, const Vec23& deviation, Vec23& dx) {
     if (!solved) return false;
     dx = Kr_ + KH_ * deviation.head<12>() - deviation;
     return dx.allFinite();
+}
+
+bool Ieskf::posterior(const NavState& predicted, const Mat23x23& P, const Vec23& dx,
+                      Mat23x23& out) const {
+    const Mat23x23 J = state_transport(predicted, dx, options_.exact_jacobians);
+    const Mat23x23 reduced = P - KH_ * P.topRows<12>();
+    const Mat23x23 moved = J * reduced * J.transpose();
+    out = 0.5 * (moved + moved.transpose());
+    return out.allFinite() && Eigen::LLT<Mat23x23>(out).info() == Eigen::Success;
 }
 
 UpdateReport Ieskf::update(NavState& x, Mat23x23& P, const Measure& measure) {
@@ -92,11 +102,7 @@ UpdateReport Ieskf::update(NavState& x, Mat23x23& P, const Measure& measure) {
     }
     if (report.status == UpdateStatus::kNoMeasurement) return report;
     report.converged = converged_steps > 0;
-    const Mat23x23 J = state_transport(predicted, dx, options_.exact_jacobians);
-    const Mat23x23 posterior = P_here - KH_ * P_here.topRows<12>();
-    P = J * posterior * J.transpose();
-    P = (0.5 * (P + P.transpose())).eval();
-    if (!P.allFinite() || !x.is_finite() || P.diagonal().minCoeff() < 0.0) return fail();
+    if (!posterior(predicted, P_here, dx, P) || !x.is_finite()) return fail();
     return report;
 }
 

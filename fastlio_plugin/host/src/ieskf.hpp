@@ -49,6 +49,10 @@ class Ieskf {
     UpdateReport update(NavState& x, Mat23x23& P, const Measure& measure);
 
   private:
+    /// Covariance after the last step, carried over to the posterior's tangent space; false when
+    /// it is not positive definite.
+    bool posterior(const NavState& predicted, const Mat23x23& P, const Vec23& dx,
+                   Mat23x23& out) const;
     /// One Gauss-Newton step from x; false when a matrix is singular or the step not finite.
     bool step(const Mat23x23& P, const Vec23& deviation, Vec23& dx);
     bool wide_gain(const Mat23x23& P);

@@ -24,11 +24,10 @@ Mat23x23 initial_covariance() {
     return p.asDiagonal();
 }
 
-/// Readings that no start can be made from. Units of g, saturated or constant readings are told,
-/// but scaling and averaging still work on them.
+/// Readings that no start can be made from. Anything else that looks wrong is told, but scaling to
+/// 9.81 m/s^2 and averaging still work on it, as they do upstream.
 bool hopeless(ImuCheckStatus status) {
-    return status == ImuCheckStatus::kNotFinite || status == ImuCheckStatus::kNoGravity ||
-           status == ImuCheckStatus::kImplausible;
+    return status == ImuCheckStatus::kNotFinite || status == ImuCheckStatus::kNoGravity;
 }
 
 }  // namespace
@@ -43,6 +42,7 @@ void ImuProcessor::reset() {
     initialised_ = has_last_end_ = false;
     count_ = 0;
     seen_.clear();
+    note_.clear();
 }
 
 bool ImuProcessor::initialise(const std::vector<ImuSample>& samples, NavState& x, Mat23x23& P) {
@@ -58,11 +58,10 @@ bool ImuProcessor::initialise(const std::vector<ImuSample>& samples, NavState& x
     ImuCheckOptions options;
     options.samples = seen_.size();
     const ImuCheck check = check_imu(seen_, options);
-    note_ = check.ok() ? std::string() : to_string(check);
-    if (hopeless(check.status)) {
-        reset();
-        return false;
-    }
+    const std::string note = check.ok() ? std::string() : to_string(check);
+    if (hopeless(check.status)) reset();
+    note_ = note;
+    if (hopeless(check.status)) return false;
     x = NavState{};
     x.extrinsic_rot = extrinsic_.R;
     x.extrinsic_pos = extrinsic_.t;
@@ -102,6 +101,8 @@ const std::vector<MotionKnot>& ImuProcessor::propagate(const MeasureGroup& group
         last_ = sample;
         if (has_last_end_ && sample.stamp < last_end_) continue;
         u = mean(head, sample);
+        interval_sum_ += seconds_between(sample.stamp, head.stamp);
+        ++intervals_;
         const bool straddles = has_last_end_ && head.stamp < last_end_;
         const double dt = seconds_between(sample.stamp, straddles ? last_end_ : head.stamp);
         d2lio::propagate(x, P, u, dt, Q, exact_);

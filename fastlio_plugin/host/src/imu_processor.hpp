@@ -26,6 +26,8 @@ class ImuProcessor {
                                              NavState& x, Mat23x23& P);
     /// One line about the readings of the start-up; empty if they look right.
     const std::string& note() const { return note_; }
+    /// Mean period of the samples used so far, s; 0 before any.
+    double mean_period() const { return intervals_ > 0 ? interval_sum_ / intervals_ : 0.0; }
     void reset();
 
   private:
@@ -45,6 +47,8 @@ class ImuProcessor {
     std::vector<ImuSample> seen_;  ///< samples of the start-up, for the check
     double accel_scale_ = 1.0;
     ImuSample last_;
+    double interval_sum_ = 0.0;  ///< s
+    int intervals_ = 0;
     Stamp last_end_ = 0;
     bool has_last_end_ = false;
     std::vector<MotionKnot> knots_;

@@ -40,10 +40,10 @@ Insertion decide(const Eigen::Vector3f& p, const Neighbours& near, float side) {
 LocalMap::LocalMap(const HostConfig& config)
     : tree_(tree_options(config)),
       voxel_(static_cast<float>(config.filter_size_map)),
-      half_side_(static_cast<float>(0.5 * config.cube_side_length)),
+      half_side_(static_cast<float>(0.5 * config.box_side())),
       trigger_(static_cast<float>(kMoveThreshold * config.det_range)),
       shift_(static_cast<float>(
-          std::max(0.45 * (config.cube_side_length - 2.0 * kMoveThreshold * config.det_range),
+          std::max(0.45 * (config.box_side() - 2.0 * kMoveThreshold * config.det_range),
                    (kMoveThreshold - 1.0) * config.det_range))) {}
 
 void LocalMap::clear() {

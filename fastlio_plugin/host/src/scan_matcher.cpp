@@ -7,6 +7,7 @@
 
 #include <Eigen/Geometry>
 #include <chrono>
+#include <limits>
 
 #include "d2lio/geometry/so3.hpp"
 
@@ -14,6 +15,8 @@ namespace d2lio::fastlio {
 namespace {
 
 constexpr int kNeighbours = 5;
+/// Far neighbours are of no use to the match, but the map's insertion rule looks at them too.
+constexpr float kUnbounded = std::numeric_limits<float>::infinity();
 constexpr std::size_t kGrain = 128;  ///< points per task
 
 using Clock = std::chrono::steady_clock;
@@ -62,7 +65,7 @@ void ScanMatcher::match(std::size_t i, const NavState& x, bool search) {
     const Vec3 p_imu = x.extrinsic_rot * p.cast<double>() + x.extrinsic_pos;
     in_map_[i] = (x.rot * p_imu + x.pos).cast<float>();
     Neighbours& near = neighbours_[i];
-    if (search) tree_->knn(in_map_[i], kNeighbours, adapter_.max_search_sq_distance(), near);
+    if (search) tree_->knn(in_map_[i], kNeighbours, kUnbounded, near);
     Candidate c{};
     c.index = i;
     c.fresh = search;

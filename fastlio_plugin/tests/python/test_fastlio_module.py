@@ -4,13 +4,14 @@
 
 from __future__ import annotations
 
+import threading
 from pathlib import Path
 
 import numpy as np
 import pytest
 from d2lio import runner
 from d2lio._fastlio import FastLioHost
-from d2lio.datasets import open_source
+from d2lio.datasets import ImuBlock, open_source, timed_events
 from d2lio.errors import ConfigError
 from d2lio.metrics import evaluate
 from d2lio.simulator import simulate
@@ -89,3 +90,43 @@ def test_without_data_there_is_nothing_to_step():
     host.finish()
     assert host.step() is None
     assert host.map_points().shape == (0, 3)
+
+
+def test_stamps_and_offsets_are_not_converted_silently():
+    host = FastLioHost()
+    with pytest.raises(TypeError):
+        host.add_imu(np.zeros(2), np.zeros((2, 3)), np.zeros((2, 3)))
+    with pytest.raises(TypeError):
+        host.add_scan(0, np.zeros((4, 3), np.float32), np.linspace(0, 0.1, 4))
+
+
+def test_data_after_finish_is_refused():
+    host = FastLioHost()
+    host.finish()
+    with pytest.raises(RuntimeError, match="no more data"):
+        host.add_imu(np.array([1], np.int64), np.zeros((1, 3)), np.full((1, 3), 9.81))
+    with pytest.raises(RuntimeError, match="no more data"):
+        host.add_scan(1, np.ones((4, 3), np.float32), np.zeros(4, np.int32))
+
+
+def test_threads_may_share_a_host(room):
+    host = FastLioHost({"point_filter_num": "1"})
+    scans, samples = [], []
+    for event in timed_events(open_source(room).reader):
+        (samples if isinstance(event, ImuBlock) else scans).append(event)
+
+    def feed_imu():
+        for block in samples:
+            host.add_imu(block.stamps, block.gyro, block.accel)
+
+    def feed_scans():
+        for scan in scans:
+            host.add_scan(scan.stamp, scan.xyz, scan.dt_ns)
+
+    results = []
+    workers = [threading.Thread(target=feed_imu), threading.Thread(target=feed_scans)]
+    for worker in workers:
+        worker.start()
+    while any(w.is_alive() for w in workers) or not results or results[-1] is not None:
+        results.append(host.step())
+    assert sum(r is not None for r in results) >= len(scans) - 1

@@ -14,12 +14,12 @@ enum class DegeneracyMethod { kNone, kPaper, kRemap };
 struct DegeneracyConfig {
     DegeneracyMethod method = DegeneracyMethod::kNone;
     PaperPrior::Form form = PaperPrior::Form::kCongruence;
-    double w = 30.0;
-    double lambda_min = 1.0;
-    bool inflate_only = true;
-    double threshold_r = 100.0;
-    double threshold_t = 100.0;
-    double weak_share = 0.03;
+    double w = 30.0;             ///< method paper
+    double lambda_min = 1.0;     ///< points and m^2, method paper
+    bool inflate_only = true;    ///< the kept covariance leaves the prior's rows out
+    double threshold_r = 100.0;  ///< m^2, method remap
+    double threshold_t = 100.0;  ///< points, method remap
+    double weak_share = 0.03;    ///< of the trace; smaller eigenvalues are reported as weak
 
     /// Binds the keys `degeneracy.*`.
     void bind(ParamTable& table);

@@ -14,22 +14,24 @@ enum class RejectionMode { kOff, kNone, kFixed, kKiss, kPointAdaptive };
 
 struct RejectionConfig {
     RejectionMode mode = RejectionMode::kOff;
-    bool keep_host_gate = false;
-    double tau = 2.0;
-    double sigma_0 = 2.0;
-    double delta_min = 0.1;
-    double r_max = 100.0;
-    std::optional<double> epsilon_0;  ///< empty: the map's voxel size
+    bool keep_host_gate = false;      ///< host's distance gates on top of the strategy
+    double tau = 2.0;                 ///< m, mode fixed
+    double sigma_0 = 2.0;             ///< m, mode kiss
+    double delta_min = 0.1;           ///< m, mode kiss
+    double r_max = 100.0;             ///< m, mode kiss
+    std::optional<double> epsilon_0;  ///< m, mode point_adaptive; empty: the map's voxel size
     PointAdaptiveRejection::Motion motion = PointAdaptiveRejection::Motion::kPredicted;
 
     /// Binds the keys `rejection.*`.
     void bind(ParamTable& table);
+    /// @throws ConfigError for values that only together make no sense.
+    void validate() const;
 };
 
 /// The strategy chosen by a RejectionConfig, with its state from scan to scan.
 class Rejector {
   public:
-    /// @param map_voxel side of the map's voxels, m; stands in for an absent epsilon_0.
+    /// @param map_voxel side of the map's voxels, m, > 0; stands in for an absent epsilon_0.
     Rejector(const RejectionConfig& config, double map_voxel);
 
     /// `off`: only the host's own gates decide.

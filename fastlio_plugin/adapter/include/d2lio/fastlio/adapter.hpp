@@ -11,8 +11,7 @@
 /// rotations 3x3 R_map_imu, lengths in m, angles in rad.
 ///
 /// Per scan: begin_scan; in each iteration accept for every point (any thread, any order), then
-/// condition on the stacked rows; end_scan. No member throws or exits, except the constructor on
-/// lack of memory.
+/// condition on the stacked rows; end_scan. Nothing throws or exits but for lack of memory.
 namespace d2lio {
 
 struct ScanDiagnostics;
@@ -82,7 +81,7 @@ struct PriorBlock {
 
 enum class Status : std::uint8_t {
     kOk,
-    kBadInput,  ///< NaN or infinity in a pose or covariance: this scan runs without the plug-in
+    kBadInput,  ///< NaN, infinity or a bad index: this scan runs on the host's own gates, no prior
     kNoScan,    ///< called outside begin_scan .. end_scan
     kSingular,  ///< a covariance could not be corrected and was left as it was
 };
@@ -104,16 +103,16 @@ class Adapter {
     /// Message of the last refused set(): key, value, allowed range. Empty if none.
     const char* error() const;
     std::size_t param_count() const;
-    ParamDoc param(std::size_t i) const;
-    /// Voxel size of the host's map (m), used where rejection.epsilon_0 is auto.
-    void set_map_voxel(double size);
+    ParamDoc param(std::size_t i) const;  ///< null strings past the end
+    /// Voxel size of the host's map (m, > 0), used where rejection.epsilon_0 is auto.
+    bool set_map_voxel(double size);
+    /// Whether the parameters fit together; if not, see error().
+    bool check();
 
     /// True when a rejection mode other than off is set: accept replaces the host's own test.
     bool rejects() const;
     /// True when a degeneracy method other than none is set: condition may change or add rows.
     bool has_prior() const;
-    /// Farthest useful neighbour: beyond this squared distance accept refuses anyway.
-    float max_search_sq_distance() const;
 
     Status begin_scan(const ScanInput& input);
     /// Decides on one point; on kAccepted fills `out`. A rejected point stays out until `fresh`.
@@ -130,7 +129,7 @@ class Adapter {
 
     /// Diagnostics of the last ended scan, by column.
     std::size_t diagnostics_size() const;
-    const char* diagnostics_name(std::size_t i) const;
+    const char* diagnostics_name(std::size_t i) const;  ///< null past the end
     double diagnostics_value(std::size_t i) const;
     /// The same as a struct, for hosts built together with this library.
     const ScanDiagnostics& diagnostics() const;

@@ -26,17 +26,19 @@ struct HostConfig {
     double extrinsic_T[3] = {0, 0, 0};                    ///< t_imu_lidar, m
     double extrinsic_R[9] = {1, 0, 0, 0, 1, 0, 0, 0, 1};  ///< R_imu_lidar, by rows
     bool exact_jacobians = false;
-    int init_samples = 10;       ///< inertial samples averaged at the start
-    double imu_gap_reset = 1.0;  ///< s, a longer gap starts a new epoch
+    int init_samples = 10;          ///< inertial samples averaged at the start
+    double imu_gap_reset = 1.0;     ///< s, a longer gap starts a new epoch
+    double lidar_gap_reset = 10.0;  ///< s, likewise
     SynchronizerOptions sync;
     bool live = false;  ///< bounded queues
     bool background_rebuild = false;
     int threads = 1;
 
-    HostConfig() { sync.end_rule = ScanEndRule::kLastInMessage; }
     void bind(ParamTable& table);
     /// T_imu_lidar. @throws ConfigError if the rotation is none, with its determinant.
     Pose extrinsic() const;
+    /// Side of the map's box (m): at least what the moving rule needs, else the box never rests.
+    double box_side() const;
     /// Checks what no single key can. @throws ConfigError
     void validate() const;
 };

@@ -22,7 +22,7 @@ enum class ScanStatus {
     kNoCorrespondence,  ///< all points rejected: pose is the prediction, covariance has grown
     kNumericalFailure,  ///< the update was not finite and was refused: pose is the prediction
     kImuFault,          ///< readings that no start can be made from
-    kReset,             ///< IMU gap beyond the bound: a new epoch begins
+    kReset,  ///< stamps jumped back, a gap beyond its bound, or a filter beyond repair: new epoch
 };
 const char* to_string(ScanStatus status);
 
@@ -35,8 +35,10 @@ struct ScanResult {
     Stamp stamp = 0;  ///< scan end: the time of the pose
     ScanStatus status = ScanStatus::kDropped;
     Health health = Health::kInit;
-    std::string message;     ///< one line where something is wrong
-    bool has_pose = false;   ///< state and covariance mean something
+    std::string message;  ///< one line where something is wrong
+    /// State and covariance mean something. True from the scan on that became the map, whose pose
+    /// is the prediction; FAST-LIO2 publishes from the next one.
+    bool has_pose = false;
     bool new_epoch = false;  ///< the map and the frame began anew with this scan
     double imu_gap_s = 0.0, lidar_gap_s = 0.0;
     NavState state;
