@@ -48,6 +48,7 @@ cmd_test() {
 
     cd -- "$ROOT" # presets and test paths are the checkout's
     ((cpp)) && SYSTEM_PACKAGES+=(libgtest-dev)
+    ((python)) && SYSTEM_PACKAGES+=(libgl1) # ouster-sdk is linked to it, even where nothing is drawn
     if ((python)); then setup_python 4; else setup_system 1; fi
 
     local reports="$REPORT_DIR/$preset"

@@ -132,6 +132,7 @@ ALL_PACKAGES = [
     "python3-venv",
     "python3-dev",
     "libgtest-dev",
+    "libgl1",
 ]
 
 

@@ -196,7 +196,7 @@ def test_small_and_full_file_system(door: Door, fill: bool) -> None:
     """A real file system of 4 MiB, in a mount name space of its own."""
     probe = ["unshare", "-m", "sh", "-c", "mount -t tmpfs none /mnt"]
     if subprocess.run(probe, capture_output=True, check=False).returncode:
-        pytest.skip("mounting a small file system needs root")
+        pytest.skip("this machine does not let us mount a small file system")
     script = """
         mount -t tmpfs -o size=4m none "$2" && cp -r "$1/." "$2" || exit 99
         [ "$3" = True ] && { cat /dev/zero >"$2/filler" 2>/dev/null; true; }
