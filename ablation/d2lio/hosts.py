@@ -118,6 +118,7 @@ def source_params(config: SourceConfig) -> dict[str, str]:
     }
     if math.isfinite(config.lidar.max_range_m):
         params["preprocess.max_range"] = repr(config.lidar.max_range_m)
+        params["mapping.det_range"] = repr(config.lidar.max_range_m)
     params.update({key: _text(value) for key, value in config.host.items()})
     return params
 
