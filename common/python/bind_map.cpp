@@ -3,7 +3,6 @@
 #include <nanobind/stl/tuple.h>
 
 #include <limits>
-#include <mutex>
 #include <string>
 
 #include "arrays.hpp"
@@ -11,6 +10,7 @@
 #include "d2lio/map/ikd_tree.hpp"
 #include "d2lio/preprocess/voxel_grid.hpp"
 #include "modules.hpp"
+#include "shared.hpp"
 
 namespace d2lio::python {
 namespace {
@@ -24,22 +24,7 @@ Box to_box(const Corner& lo, const Corner& hi) {
             Eigen::Map<const Eigen::Vector3f>(hi.data())};
 }
 
-/// A tree that any number of Python threads may call in turn; the interpreter's lock is given up.
-class SharedTree {
-  public:
-    explicit SharedTree(const IkdTreeOptions& options) : tree_(options) {}
-
-    template <typename F>
-    auto call(const F& f) {
-        nb::gil_scoped_release release;
-        const std::lock_guard lock(mutex_);
-        return f(tree_);
-    }
-
-  private:
-    std::mutex mutex_;
-    IkdTree tree_;
-};
+using SharedTree = Shared<IkdTree>;
 
 void construct(SharedTree* self, float leaf, double delete_ratio, double balance_ratio,
                bool background) {

@@ -5,11 +5,11 @@
 #include <nanobind/stl/string.h>
 
 #include <cmath>
-#include <mutex>
 #include <stdexcept>
 
 #include "../../common/python/arrays.hpp"
 #include "../../common/python/errors.hpp"
+#include "../../common/python/shared.hpp"
 #include "d2lio/fastlio/host.hpp"
 
 namespace d2lio::python {
@@ -19,23 +19,7 @@ using namespace nb::literals;
 using fastlio::Host;
 using fastlio::ScanResult;
 
-/// A host that any number of Python threads may call: the interpreter's lock is given up first, so
-/// that a long step() holds nobody else, and calls take turns.
-class SharedHost {
-  public:
-    SharedHost(const fastlio::ParamMap& params, int threads) : host_(params, threads) {}
-
-    template <typename F>
-    auto call(const F& f) {
-        nb::gil_scoped_release release;
-        const std::lock_guard lock(mutex_);
-        return f(host_);
-    }
-
-  private:
-    std::mutex mutex_;
-    Host host_;
-};
+using SharedHost = Shared<Host>;
 
 [[noreturn]] void refuse_after_finish() {
     throw std::runtime_error("the host has been told that no more data will come (finish)");
