@@ -17,6 +17,9 @@ class Shared {
     template <typename... Args>
     explicit Shared(Args&&... args) : object_(std::forward<Args>(args)...) {}
 
+    Shared(const Shared&) = delete;
+    Shared(Shared&&) = delete;
+
     template <typename F>
     auto call(const F& f) {
         nanobind::gil_scoped_release release;
