@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
 # shellcheck shell=bash
 #
-# ./d2lio lint: every linter over the tracked files; each counts as one check.
+# ./d2lio lint: every linter over the checkout; each counts as one check.
 
 lint_passed=0 lint_failed=0 lint_skipped=0
 
@@ -18,14 +18,13 @@ check() { # NAME COMMAND...
     fi
 }
 
-tracked() { git -C "$ROOT" ls-files -z -- "$@"; } # PATTERN...
-
 cmd_lint() {
     (($# == 0)) || die "$E_USAGE" "lint: takes no argument, got '$1'"
     setup_python 4
     cd -- "$ROOT"
     local cpp bin="$VENV/bin"
-    mapfile -d '' -t cpp < <(tracked '*.hpp' '*.h' '*.cpp')
+    mapfile -d '' -t cpp < <(find . \( -path ./build -o -path ./.venv -o -path ./results \) -prune \
+        -o -type f \( -name '*.hpp' -o -name '*.h' -o -name '*.cpp' \) -print0)
     check clang-format "$bin/clang-format" --dry-run -Werror "${cpp[@]}"
     check 'ruff check' "$bin/ruff" check --quiet .
     check 'ruff format' "$bin/ruff" format --quiet --check .
