@@ -165,10 +165,11 @@ TEST(Adapter, BadCallsAreRefusedWithoutHarm) {
     EXPECT_EQ(a.param(10000).key, nullptr);
     EXPECT_EQ(a.diagnostics_name(10000), nullptr);
     EXPECT_TRUE(std::isnan(a.diagnostics_value(10000)));
-    ScanInput in = Scene().input();
+    const Scene scene;  // the views point into it
+    ScanInput in = scene.input();
     in.covariance = nullptr;
     EXPECT_EQ(a.begin_scan(in), Status::kBadInput);
-    in = Scene().input();
+    in = scene.input();
     in.rotation_index = 21;
     EXPECT_EQ(a.begin_scan(in), Status::kBadInput);
     EXPECT_TRUE(a.check());
