@@ -24,7 +24,7 @@ check_system() {
     # shellcheck source=/dev/null
     about=$(. "$os_release" 2>/dev/null && echo "${ID:-} ${ID_LIKE:-}|${PRETTY_NAME:-unknown}") || about='|unknown'
     if [[ " ${about%%|*} " != *' debian '* ]] || ! command -v apt-get >/dev/null; then
-        die "$E_SYSTEM" "unsupported system (${about#*|}): needs Debian 12 or 13 or Ubuntu 24.04, \
+        die "$E_SYSTEM" "unsupported system (${about#*|}): needs Debian 12 or 13 (or a derivative), \
 or D2LIO_OFFLINE=1 with everything installed"
     fi
 }
