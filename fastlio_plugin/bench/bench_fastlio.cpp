@@ -3,6 +3,7 @@
 #include <benchmark/benchmark.h>
 
 #include "../tests/drive.hpp"
+#include "d2lio/fastlio/adapter.hpp"
 
 namespace d2lio::fastlio {
 namespace {
@@ -106,6 +107,28 @@ void BM_PluginCost(benchmark::State& state) {
     state.counters["share_percent"] = 100.0 * (on - off) / off;
 }
 BENCHMARK(BM_PluginCost)->Unit(benchmark::kMillisecond)->Iterations(20)->Repetitions(5);
+
+/// Analysis and prior rows of one iteration over 1 000 correspondences: what BM_PluginCost cannot
+/// show, since the host analyses every scan for its diagnostics, with mode off too.
+void BM_Condition(benchmark::State& state) {
+    constexpr Eigen::Index kRows = 1000;
+    test::Random random(1);
+    Eigen::Matrix<double, Eigen::Dynamic, 12, Eigen::RowMajor> H(kRows, 12);
+    for (Eigen::Index i = 0; i < kRows; ++i) H.row(i) = random.vector(12, 1.0).transpose();
+    Eigen::VectorXd r = Eigen::VectorXd::Zero(kRows);
+    const Pose pose;
+    const PoseView view{pose.R.data(), pose.t.data()};
+    const Mat23x23 P = Mat23x23::Identity();
+    Adapter adapter;
+    adapter.set("degeneracy.method", "paper");
+    adapter.begin_scan({view, view, P.data(), 23, 0, 3, 1});
+    PriorBlock prior{};
+    for (auto _ : state) {
+        adapter.condition({H.data(), r.data(), kRows, 12, 1, 0, 3}, view, 0.001, &prior);
+        benchmark::DoNotOptimize(prior);
+    }
+}
+BENCHMARK(BM_Condition)->Unit(benchmark::kMicrosecond);
 
 }  // namespace
 }  // namespace d2lio::fastlio
