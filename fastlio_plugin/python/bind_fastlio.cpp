@@ -32,17 +32,15 @@ std::size_t add_imu(SharedHost& shared, const Array<std::int64_t>& stamps, const
         throw nb::value_error("stamps, gyro and accel differ in length");
     }
     return shared.call([&](Host& host) {
-        std::size_t accepted = 0;
+        std::size_t count = 0;
         for (std::size_t i = 0; i < n; ++i) {
             const PushStatus status =
                 host.add_imu({stamps.data()[i], Eigen::Map<const Vec3>(gyro.data() + 3 * i),
                               Eigen::Map<const Vec3>(accel.data() + 3 * i)});
             if (status == PushStatus::kFinished) refuse_after_finish();
-            const bool taken = status == PushStatus::kAccepted || status == PushStatus::kNewEpoch ||
-                               status == PushStatus::kQueueFullDropped;
-            accepted += taken ? 1 : 0;
+            count += accepted(status) ? 1 : 0;
         }
-        return accepted;
+        return count;
     });
 }
 

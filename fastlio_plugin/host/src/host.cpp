@@ -89,12 +89,6 @@ std::string gap_message(const char* sensor, double seconds) {
     return std::string(sensor) + " gap of " + std::to_string(seconds) + " s";
 }
 
-/// Whether a pushed scan waits to be processed.
-bool pending(PushStatus status) {
-    return status == PushStatus::kAccepted || status == PushStatus::kNewEpoch ||
-           status == PushStatus::kQueueFullDropped;
-}
-
 void say(ScanResult& r, const std::string& text) {
     if (!text.empty()) r.message += (r.message.empty() ? "" : "; ") + text;
 }
@@ -162,7 +156,7 @@ PushStatus Host::Impl::add_scan(Scan scan) {
     const Stamp stamp = scan.stamp;
     filtered_ += filter_.apply(scan.points);
     const PushStatus status = sync_.push_scan(std::move(scan));
-    if (pending(status)) arrivals_.push_back({stamp, raw, watch.lap()});
+    if (accepted(status)) arrivals_.push_back({stamp, raw, watch.lap()});
     while (arrivals_.size() > sync_.pending_scans()) arrivals_.pop_front();
     return status;
 }

@@ -45,6 +45,12 @@ enum class PushStatus {
     kFinished           ///< refused after finish()
 };
 
+/// Whether a message with this status is in the queue.
+constexpr bool accepted(PushStatus status) {
+    return status == PushStatus::kAccepted || status == PushStatus::kNewEpoch ||
+           status == PushStatus::kQueueFullDropped;
+}
+
 /// Everything refused or lost, by reason.
 struct SyncCounts {
     std::size_t imu_accepted = 0, imu_late = 0, imu_duplicate = 0, imu_bad = 0, imu_overflow = 0;
