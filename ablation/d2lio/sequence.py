@@ -11,12 +11,12 @@ from typing import Annotated, Literal
 import numpy as np
 import yaml
 from pydantic import (
+    AfterValidator,
     BaseModel,
     ConfigDict,
     Field,
     PrivateAttr,
     ValidationError,
-    field_validator,
     model_validator,
 )
 
@@ -29,6 +29,22 @@ Positive = Annotated[float, Field(gt=0.0, allow_inf_nan=False)]
 NonNegative = Annotated[float, Field(ge=0.0, allow_inf_nan=False)]
 Text = Annotated[str, Field(min_length=1)]
 Row = Annotated[list[float], Field(min_length=4, max_length=4)]
+
+
+def _rigid(rows: list[list[float]]) -> list[list[float]]:
+    matrix = np.asarray(rows, dtype=float)
+    if not np.isfinite(matrix).all() or not np.array_equal(matrix[3], [0.0, 0.0, 0.0, 1.0]):
+        raise ValueError("finite numbers and a last row of 0 0 0 1")
+    rotation = matrix[:3, :3]
+    error = np.abs(rotation @ rotation.T - np.eye(3)).max()
+    determinant = float(np.linalg.det(rotation))
+    if error > ROTATION_TOLERANCE or determinant < 0.0:
+        raise ValueError(f"a rotation in SO(3); this one has determinant {determinant:.6g}")
+    return rows
+
+
+# A rigid transform, 4x4 by rows; a rotation that is none is refused with its determinant.
+RigidRows = Annotated[list[Row], Field(min_length=4, max_length=4), AfterValidator(_rigid)]
 
 
 class _Strict(BaseModel):
@@ -82,23 +98,10 @@ class Sequence(_Strict):
     name: Text
     bag: Text
     ground_truth: Text | None
-    T_imu_lidar: Annotated[list[Row], Field(min_length=4, max_length=4)]
+    T_imu_lidar: RigidRows
     lidar: LidarInfo
     imu: ImuInfo
     _root: Path = PrivateAttr(default=Path("."))
-
-    @field_validator("T_imu_lidar")
-    @classmethod
-    def _rigid(cls, rows: list[list[float]]) -> list[list[float]]:
-        matrix = np.asarray(rows, dtype=float)
-        if not np.isfinite(matrix).all() or not np.array_equal(matrix[3], [0.0, 0.0, 0.0, 1.0]):
-            raise ValueError("finite numbers and a last row of 0 0 0 1")
-        rotation = matrix[:3, :3]
-        error = np.abs(rotation @ rotation.T - np.eye(3)).max()
-        determinant = float(np.linalg.det(rotation))
-        if error > ROTATION_TOLERANCE or determinant < 0.0:
-            raise ValueError(f"a rotation in SO(3); this one has determinant {determinant:.6g}")
-        return rows
 
     @classmethod
     def load(cls, directory: Path | str) -> Sequence:

@@ -9,13 +9,12 @@ from typing import Annotated, Literal
 
 import numpy as np
 import yaml
-from pydantic import BaseModel, ConfigDict, Field, ValidationError, field_validator
+from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
 from d2lio.datasets.events import TimeHint
 from d2lio.errors import ConfigError, DataError
-from d2lio.sequence import ROTATION_TOLERANCE, Sequence
+from d2lio.sequence import RigidRows, Sequence
 
-Row = Annotated[list[float], Field(min_length=4, max_length=4)]
 IDENTITY = [[float(i == j) for j in range(4)] for i in range(4)]
 
 
@@ -59,24 +58,12 @@ class SourceConfig(_Strict):
     """
 
     name: str = ""
-    T_imu_lidar: Annotated[list[Row], Field(min_length=4, max_length=4)] = IDENTITY
+    T_imu_lidar: RigidRows = IDENTITY
     stamps: Literal["header", "log"] = "header"
     ground_truth: str | None = None
     lidar: LidarSource = LidarSource()
     imu: ImuSource = ImuSource()
     host: dict[str, str | float | int | bool | list[float]] = {}
-
-    @field_validator("T_imu_lidar")
-    @classmethod
-    def _rigid(cls, rows: list[list[float]]) -> list[list[float]]:
-        matrix = np.asarray(rows, dtype=float)
-        if not np.isfinite(matrix).all() or not np.array_equal(matrix[3], [0.0, 0.0, 0.0, 1.0]):
-            raise ValueError("finite numbers and a last row of 0 0 0 1")
-        rotation = matrix[:3, :3]
-        determinant = float(np.linalg.det(rotation))
-        if np.abs(rotation @ rotation.T - np.eye(3)).max() > ROTATION_TOLERANCE or determinant < 0:
-            raise ValueError(f"a rotation in SO(3); this one has determinant {determinant:.6g}")
-        return rows
 
     @property
     def extrinsic(self) -> np.ndarray:
