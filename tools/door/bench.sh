@@ -7,7 +7,7 @@
 cmd_bench() {
     cd -- "$ROOT" # presets are the checkout's
     SYSTEM_PACKAGES+=(libbenchmark-dev)
-    setup_python 4
+    setup_python
     build_preset bench
     local results="$BUILD/bench/results" binary files=()
     rm -rf -- "$results" && mkdir -p "$results"

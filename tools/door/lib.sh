@@ -12,7 +12,7 @@ readonly VENV="$ROOT/.venv"
 
 readonly E_FAILED=1 E_USAGE=2 E_SYSTEM=10 E_ROOT=11 E_DOWNLOAD=12 E_DISK=13 E_TOOL=14 E_BUILD=15
 readonly E_INTERRUPTED=130
-readonly MIN_FREE_KIB=$((2 * 1024 * 1024))
+readonly MIN_FREE_MIB=2048
 
 # A PYTHONPATH meant for another Python (ROS sets one) must not leak into the virtual environment.
 unset PYTHONPATH PYTHONHOME
@@ -84,19 +84,19 @@ die_with_log() {
     die "$code" "$3: $(telling_line "$log") (log: $log)"
 }
 
-make_dirs() {
+make_dirs() { # PATH...
     local why
-    if ! why=$(mkdir -p "$LOG_DIR" "$STAMP_DIR" "$REPORT_DIR" 2>&1); then
+    if ! why=$(mkdir -p -- "$@" 2>&1); then
         [[ $why == *'No space left'* ]] && die "$E_DISK" "the disk is full: $why"
-        die "$E_FAILED" "cannot write to this checkout: $why"
+        die "$E_FAILED" "cannot make a folder: $why"
     fi
 }
 
-need_free_space() {
-    local free
-    free=$(df -Pk -- "$ROOT" | awk 'NR == 2 {print $4}')
-    if [[ $free =~ ^[0-9]+$ ]] && ((free < MIN_FREE_KIB)); then
-        die "$E_DISK" "the disk is full: $((free / 1024)) MiB free at $ROOT, set-up needs 2048 MiB"
+need_free_space() { # [FOLDER MIB]
+    local folder=${1:-$ROOT} needed=${2:-$MIN_FREE_MIB} free
+    free=$(df -Pk -- "$folder" | awk 'NR == 2 {print $4}')
+    if [[ $free =~ ^[0-9]+$ ]] && ((free < needed * 1024)); then
+        die "$E_DISK" "the disk is full: $((free / 1024)) MiB free at $folder, set-up needs $needed MiB"
     fi
 }
 

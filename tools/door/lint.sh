@@ -20,7 +20,7 @@ check() { # NAME COMMAND...
 
 cmd_lint() {
     (($# == 0)) || die "$E_USAGE" "lint: takes no argument, got '$1'"
-    setup_python 4
+    setup_python
     cd -- "$ROOT"
     local cpp bin="$VENV/bin"
     mapfile -d '' -t cpp < <(find . \( -path ./build -o -path ./.venv -o -path ./results \) -prune \
@@ -30,7 +30,7 @@ cmd_lint() {
     check 'ruff format' "$bin/ruff" format --quiet --check .
     check codespell "$bin/codespell"
     if command -v shellcheck >/dev/null; then
-        check shellcheck shellcheck -x -a d2lio .ci/run
+        check shellcheck shellcheck -x -a d2lio tools/door/build_gtsam.sh .ci/run
     else
         say 'skipped shellcheck (not installed)'
         lint_skipped=1

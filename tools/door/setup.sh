@@ -2,7 +2,8 @@
 # SPDX-License-Identifier: BSD-3-Clause
 # shellcheck shell=bash
 #
-# Set-up in four steps: system packages, virtual environment, Python packages, the d2lio package.
+# Set-up in five steps: system packages, GTSAM, virtual environment, Python packages, the d2lio
+# package.
 # Each step does nothing when its inputs are unchanged, and can be interrupted at any moment.
 
 readonly PYTHON=${D2LIO_PYTHON:-/usr/bin/python3}
@@ -14,6 +15,8 @@ readonly PACKAGE_INPUTS=(
     pyproject.toml README.md LICENSE CMakeLists.txt cmake ablation/d2lio
     common/CMakeLists.txt common/include common/src common/python
     fastlio_plugin/CMakeLists.txt fastlio_plugin/adapter fastlio_plugin/host fastlio_plugin/python
+    liosam_plugin/CMakeLists.txt liosam_plugin/adapter liosam_plugin/host liosam_plugin/python
+    liosam_plugin/config
 )
 
 offline() { [[ ${D2LIO_OFFLINE:-0} == 1 ]]; }
@@ -29,25 +32,35 @@ or D2LIO_OFFLINE=1 with everything installed"
     fi
 }
 
+# installed_packages NAME...: "NAME VERSION" of those of them that are installed.
+installed_packages() {
+    # dpkg-query fails where it knows one of the names not; what it prints about the others counts.
+    { dpkg-query -W -f '${Package} ${db:Status-Abbrev} ${Version}\n' "$@" || true; } 2>/dev/null |
+        awk '$2 == "ii" {print $1, $3}'
+}
+
 missing_packages() {
     command -v dpkg-query >/dev/null || return 0 # another system, with D2LIO_OFFLINE
-    local installed package
-    # dpkg-query fails where it knows one of the names not; what it prints about the others counts.
-    installed=$({ dpkg-query -W -f '${Package} ${db:Status-Abbrev}\n' "${SYSTEM_PACKAGES[@]}" || true; } \
-        2>/dev/null | awk '$2 == "ii" {print $1}')
-    for package in "${SYSTEM_PACKAGES[@]}"; do
-        grep -qx -- "$package" <<<"$installed" || echo "$package"
+    local wanted=("${SYSTEM_PACKAGES[@]}" "${GTSAM_PACKAGES[@]}") installed package
+    installed=$'\n'$(installed_packages "${wanted[@]}")
+    for package in "${wanted[@]}"; do
+        [[ $installed == *$'\n'"$package "* ]] || echo "$package"
     done
 }
 
+# What runs a command as root; fails where nothing can.
+as_root=()
+become_root() {
+    [[ $(id -u) == 0 ]] && return
+    as_root=(sudo)
+    [[ -t 0 ]] || as_root=(sudo -n) # nobody there to type a password
+    "${as_root[@]}" true 2>/dev/null
+}
+
 apt_install() { # PACKAGE...
-    local as_root=() apt_options=(-o 'DPkg::Lock::Timeout=300' -o 'Acquire::Retries=2')
-    if [[ $(id -u) != 0 ]]; then
-        as_root=(sudo)
-        [[ -t 0 ]] || as_root=(sudo -n) # nobody there to type a password
-        "${as_root[@]}" true 2>/dev/null || die "$E_ROOT" "system packages are missing and \
-installing them needs root; run this once as root: apt-get install $*"
-    fi
+    local apt_options=(-o 'DPkg::Lock::Timeout=300' -o 'Acquire::Retries=2')
+    become_root || die "$E_ROOT" "system packages are missing and installing them needs root; \
+run this once as root: apt-get install $*"
     # In the foreground: dpkg must not be cut off in the middle of a package.
     local run=("${as_root[@]}" env DEBIAN_FRONTEND=noninteractive) log="$LOG_DIR/apt.log"
     {
@@ -90,7 +103,7 @@ make_venv() { # FINGERPRINT
         "$PYTHON" -c 'import sys; sys.exit(sys.version_info < (3, 11))' 2>/dev/null ||
             die "$E_SYSTEM" "unsupported system: $PYTHON is missing or older than Python 3.11"
         need_free_space
-        step 2 'Python environment (.venv)'
+        step 3 'Python environment (.venv)'
         run_logged venv "$PYTHON" -m venv --clear "$VENV" ||
             die_with_log "$E_FAILED" venv 'creating .venv failed'
         rm -f -- "$DIRTY"
@@ -110,7 +123,7 @@ install_requirements() { # FINGERPRINT
     if [[ -n $missing ]]; then
         offline && die "$E_DOWNLOAD" "D2LIO_OFFLINE is set and Python packages are missing: ${missing//$'\n'/, }"
         need_free_space
-        step 3 "Python packages ($(wc -l <<<"$missing") missing)"
+        step 4 "Python packages ($(wc -l <<<"$missing") missing)"
         # A pip killed while it unpacks leaves packages that look whole: the marker makes the next
         # call start with a clean environment. A pip that failed while downloading left nothing.
         : >"$DIRTY"
@@ -127,10 +140,13 @@ install_requirements() { # FINGERPRINT
 
 install_package() { # FINGERPRINT
     need_free_space
-    step 4 'building and installing the d2lio package'
+    step 5 'building and installing the d2lio package'
+    local cmake_arguments
+    printf -v cmake_arguments '%s;' "${GTSAM_ARGUMENTS[@]}"
     CMAKE_BUILD_PARALLEL_LEVEL=${D2LIO_JOBS:-$(jobs_default)} \
         run_logged package "$VENV/bin/python" -m pip install --no-input --no-index --no-deps \
-        --no-build-isolation --force-reinstall "--config-settings=build-dir=$BUILD/python" "$ROOT" ||
+        --no-build-isolation --force-reinstall "--config-settings=build-dir=$BUILD/python" \
+        "--config-settings=cmake.args=${cmake_arguments%;}" "$ROOT" ||
         die_with_log "$E_BUILD" package 'building the d2lio package failed'
     write_stamp package "$1"
 }
@@ -143,37 +159,45 @@ use_ccache() {
     fi
 }
 
-# setup_system TOTAL: step 1 alone, for verbs that need no Python package.
-setup_system() {
+# start_setup TOTAL: what is found out before the first step.
+start_setup() {
     step_total=$1
-    make_dirs
+    make_dirs "$LOG_DIR" "$STAMP_DIR" "$REPORT_DIR"
     check_system
     use_ccache
+    choose_gtsam
+}
+
+# setup_system: the first two steps alone, for verbs that need no Python package.
+setup_system() {
+    start_setup 2
     take_lock
     install_system_packages
+    install_gtsam
     drop_lock
+    use_gtsam
 }
 
 compute_fingerprints() {
     venv_print=$(venv_fingerprint)
     requirements_print=$(fingerprint "$venv_print" pyproject.toml tools/door/requirements.py)
-    package_print=$(fingerprint "$requirements_print" "${PACKAGE_INPUTS[@]}")
+    package_print=$(fingerprint "$requirements_print $(gtsam_print)" "${PACKAGE_INPUTS[@]}")
 }
 
-# setup_python TOTAL: all four steps; nothing but a few hashes when nothing changed.
+# setup_python: all five steps; nothing but a few hashes when nothing changed.
 setup_python() {
-    step_total=$1
-    make_dirs
-    check_system
-    use_ccache
+    start_setup 5
     local venv_print requirements_print package_print
     compute_fingerprints
     if stamp_is package "$package_print" && [[ ! -e $DIRTY && -x $VENV/bin/d2lio ]] &&
-        [[ -z $(missing_packages) ]]; then
+        [[ -z $(missing_packages) ]] && gtsam_is_there; then
+        use_gtsam
         return
     fi
     take_lock
     install_system_packages
+    install_gtsam
+    use_gtsam
     compute_fingerprints # anew: Python itself may have come with the packages
     if ! stamp_is venv "$venv_print" || ! venv_works; then
         make_venv "$venv_print"

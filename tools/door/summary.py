@@ -4,7 +4,8 @@
 
 ``summary.py REPORTS [--ctest] [--pytest]`` expects, under REPORTS, what it is told was run:
 ``ctest.xml`` and ``gtest/BINARY.xml``, ``pytest.xml`` and ``pytest.status``. A runner or a binary
-that died counts as one failure, whatever it had reported before. The counts are also written to
+that died counts as one failure, whatever it had reported before. ``--left-out TEXT`` is what was
+not built and so not tested; the closing line says it. Counts and that text are also written to
 ``REPORTS/counts``. Exits 1 on any failure and when no test passed.
 
 ``summary.py --sum COUNTS...`` adds up such files; a file that is missing counts as one failure.
@@ -13,6 +14,7 @@ Standard library only.
 
 from __future__ import annotations
 
+import argparse
 import sys
 import xml.etree.ElementTree as ET
 from dataclasses import dataclass
@@ -21,21 +23,32 @@ from pathlib import Path
 
 @dataclass(frozen=True)
 class Counts:
-    """Numbers of test cases by outcome."""
+    """Numbers of test cases by outcome, and what was left out of the build."""
 
     passed: int = 0
     failed: int = 0
     skipped: int = 0
+    left_out: frozenset[str] = frozenset()
 
     def __add__(self, other: Counts) -> Counts:
         return Counts(
-            self.passed + other.passed, self.failed + other.failed, self.skipped + other.skipped
+            self.passed + other.passed,
+            self.failed + other.failed,
+            self.skipped + other.skipped,
+            self.left_out | other.left_out,
         )
 
     def line(self) -> str:
         """The closing line, for example ``12 passed, 0 failed, 1 skipped``."""
         tail = f", {self.skipped} skipped" if self.skipped else ""
-        return f"{self.passed} passed, {self.failed} failed{tail}"
+        left_out = f" (left out: {'; '.join(sorted(self.left_out))})" if self.left_out else ""
+        return f"{self.passed} passed, {self.failed} failed{tail}{left_out}"
+
+    def text(self) -> str:
+        """What ``read_counts`` reads."""
+        return "\n".join(
+            [f"{self.passed} {self.failed} {self.skipped}", *sorted(self.left_out), ""]
+        )
 
 
 ONE_FAILURE = Counts(failed=1)
@@ -101,22 +114,30 @@ def count_pytest(reports: Path) -> Counts:
 def read_counts(path: Path) -> Counts:
     """Counts written by an earlier run; one failure where that run did not get so far."""
     try:
-        return Counts(*(int(word) for word in path.read_text().split()))
-    except (OSError, ValueError, TypeError):
+        numbers, *left_out = path.read_text().splitlines()
+        passed, failed, skipped = (int(word) for word in numbers.split())
+    except (OSError, ValueError):
         return ONE_FAILURE
+    return Counts(passed, failed, skipped, frozenset(left_out))
 
 
 def main(arguments: list[str]) -> int:
     """Entry point; returns the exit code."""
-    total = Counts()
-    if arguments[0] == "--sum":
-        for name in arguments[1:]:
-            total += read_counts(Path(name))
-    else:
-        reports = Path(arguments[0])
-        total += count_ctest(reports) if "--ctest" in arguments else Counts()
-        total += count_pytest(reports) if "--pytest" in arguments else Counts()
-        (reports / "counts").write_text(f"{total.passed} {total.failed} {total.skipped}\n")
+    parser = argparse.ArgumentParser()
+    parser.add_argument("reports", type=Path, nargs="?")
+    parser.add_argument("--ctest", action="store_true")
+    parser.add_argument("--pytest", action="store_true")
+    parser.add_argument("--left-out", action="append", default=[])
+    parser.add_argument("--sum", type=Path, nargs="+", default=[])
+    options = parser.parse_args(arguments)
+
+    total = Counts(left_out=frozenset(options.left_out))
+    for path in options.sum:
+        total += read_counts(path)
+    if options.reports:
+        total += count_ctest(options.reports) if options.ctest else Counts()
+        total += count_pytest(options.reports) if options.pytest else Counts()
+        (options.reports / "counts").write_text(total.text())
     print(total.line(), flush=True)
     return 1 if total.failed or not total.passed else 0
 

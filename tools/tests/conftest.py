@@ -20,16 +20,20 @@ def door(tmp_path: Path) -> Door:
     bin_.mkdir()
     for tool in [*REAL_TOOLS, "cp", "chmod"]:
         (bin_ / tool).symlink_to(shutil.which(tool))
-    (tmp_path / "os-release").write_text('ID=debian\nPRETTY_NAME="Debian 12"\n')
+    (tmp_path / "os-release").write_text(
+        'ID=debian\nVERSION_ID="12"\nVERSION_CODENAME=bookworm\nPRETTY_NAME="Debian 12"\n'
+    )
     environment = {
         "PATH": str(bin_),
         "HOME": str(tmp_path),
         "CALLS": str(tmp_path / "calls"),
         "INSTALLED": str(tmp_path / "installed"),
         "PIP_PID": str(tmp_path / "pip.pid"),
+        "APT_ETC": str(tmp_path / "apt"),
         "REAL_PYTHON": sys.executable,
         "D2LIO_PYTHON": str(bin_ / "python3"),
         "D2LIO_OS_RELEASE": str(tmp_path / "os-release"),
+        "FAKE_CANDIDATE": "4.2.0+dfsg-1",
         "FAKE_CTEST": "",
         "FAKE_GTEST": "",
         "FAKE_PYTEST": "",

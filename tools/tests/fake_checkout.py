@@ -6,6 +6,7 @@ from __future__ import annotations
 
 import shutil
 import subprocess
+import time
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -40,7 +41,9 @@ REAL_TOOLS = [
     "sort",
     "tail",
     "touch",
+    "tee",
     "true",
+    "uname",
     "wc",
     "xargs",
 ]
@@ -48,19 +51,40 @@ REAL_TOOLS = [
 # Each fake writes its call to $CALLS; FAKE_* variables choose how it ends.
 FAKES = {
     "apt-get": """
-        case "$*" in *install*) ;; *) exit 0 ;; esac
+        case "$*" in
+            *indextargets*) [ -z "${FAKE_NO_LISTS:-}" ] || [ -e "$CALLS.lists" ] || exit 0
+                            echo 'MetaKey: main/binary-amd64/Packages'; exit 0 ;;
+            *update*) touch "$CALLS.lists"; exit "${FAKE_UPDATE:-0}" ;;
+            *' source '*)
+                [ "${FAKE_SOURCE:-ok}" = ok ] || { echo 'E: Unable to find a source'; exit 100; }
+                echo tarball >gtsam_4.2.0+dfsg.orig.tar.xz; exit 0 ;;
+            *install*) ;;
+            *) exit 0 ;;
+        esac
         if [ "${FAKE_APT:-ok}" != ok ]; then
             echo 'E: Failed to fetch libtbb-dev  Could not connect'; exit 100
         fi
         for word; do echo "$word"; done >>"$INSTALLED"
     """,
+    "apt-cache": """
+        [ -z "${FAKE_NO_LISTS:-}" ] || [ -e "$CALLS.lists" ] || exit 0
+        printf 'libgtsam-dev:\\n  Installed: (none)\\n  Candidate: %s\\n' "$FAKE_CANDIDATE"
+    """,
+    "apt-config": """
+        printf "list='%s'\\nparts='%s/'\\n" "$APT_ETC/sources.list" "$APT_ETC/sources.list.d"
+    """,
     "dpkg": "exit 0",
     "dpkg-query": """
-        while read -r name; do printf '%s ii \\n' "$name"; done <"$INSTALLED"
+        status=0
         for word; do # as the real one: fails when a package is unknown
             case "$word" in -*|*Package*|*Status*) continue ;; esac
-            grep -qx -- "$word" "$INSTALLED" || exit 1
+            if grep -qx -- "$word" "$INSTALLED"; then
+                printf '%s ii 4.2.0+dfsg-1\\n' "$word"
+            else
+                status=1
+            fi
         done
+        exit $status
     """,
     "sudo": """
         [ "${FAKE_SUDO:-ok}" = ok ] || exit 1
@@ -69,7 +93,22 @@ FAKES = {
     """,
     "c++": "exit 0",
     "ninja": "exit 0",
+    "patch": "exit 0",
+    "tar": "exit 0",
     "cmake": """
+        case "$*" in
+            '--build build '*) # of GTSAM
+                case "${FAKE_GTSAM:-ok}" in
+                    ok) ;;
+                    hang) touch build/first.o; echo $$ >"$PIP_PID"; exec sleep 60 ;;
+                    full) echo 'fatal error: error writing: No space left on device'; exit 1 ;;
+                    *) echo 'Pose3.cpp:7:1: error: expected ;'; exit 1 ;;
+                esac ;;
+            *' -DCMAKE_INSTALL_PREFIX='*) mkdir -p build ;;
+            '--install build')
+                mkdir -p prefix/lib/cmake/GTSAM; touch prefix/lib/cmake/GTSAM/GTSAMConfig.cmake ;;
+            *) echo "CMAKE_PREFIX_PATH $CMAKE_PREFIX_PATH" >>"$CALLS" ;;
+        esac
         if [ "${FAKE_BUILD:-ok}" != ok ]; then
             echo 'so3.cpp:12:3: error: expected ;'; echo 'ninja: build stopped'; exit 1
         fi
@@ -108,6 +147,7 @@ FAKES = {
                         touch "$here/packages"; echo $$ >"$PIP_PID"; exec sleep 60 ;;
                 esac ;;
             *'pip install'*)
+                echo "CMAKE_PREFIX_PATH $CMAKE_PREFIX_PATH" >>"$CALLS"
                 if [ "${FAKE_BUILD:-ok}" != ok ]; then
                     echo 'so3.cpp:12:3: error: expected ;'
                     echo 'ERROR: Failed building wheel'
@@ -123,6 +163,25 @@ FAKES = {
     """,
 }
 
+GTSAM_NEEDS = [
+    *(
+        f"libboost-{part}-dev"
+        for part in (
+            "chrono",
+            "date-time",
+            "filesystem",
+            "program-options",
+            "regex",
+            "serialization",
+            "system",
+            "thread",
+            "timer",
+        )
+    ),
+    "libmetis-dev",
+    "libsuitesparse-dev",
+]
+
 ALL_PACKAGES = [
     "build-essential",
     "cmake",
@@ -133,6 +192,8 @@ ALL_PACKAGES = [
     "python3-dev",
     "libgtest-dev",
     "libgl1",
+    *GTSAM_NEEDS,
+    "libgtsam-dev",
 ]
 
 
@@ -170,12 +231,14 @@ class Door:
         return subprocess.CompletedProcess(arguments, process.returncode, out, err)
 
     def calls(self) -> list[str]:
-        """Fakes that changed something since the last look: apt, venv, pip, build."""
+        """Fakes that changed something since the last look: apt, gtsam, venv, pip, build."""
         log = Path(self.environment["CALLS"])
         seen = []
         for line in log.read_text().splitlines():
             if line.startswith("apt-get") and " install " in line:
                 seen.append("apt")
+            elif line == "cmake --install build":
+                seen.append("gtsam")
             elif "-m venv" in line:
                 seen.append("venv")
             elif "--no-index" in line:
@@ -205,3 +268,11 @@ def copy_front_door(root: Path) -> None:
     for name in ("common/src/so3.cpp", "common/tests/test_so3.cpp", "ablation/d2lio/cli.py"):
         (root / name).parent.mkdir(parents=True, exist_ok=True)
         (root / name).write_text("one\n")
+
+
+def wait_for(path: Path) -> None:
+    """Waits until the file is there and not empty."""
+    end = time.monotonic() + TIME_LIMIT_S
+    while not (path.exists() and path.read_text()):
+        assert time.monotonic() < end, f"{path} did not appear"
+        time.sleep(0.02)

@@ -105,6 +105,17 @@ def test_part_of_a_ci_run_that_did_not_end_counts_as_failed(tmp_path: Path) -> N
     assert close("--sum", tmp_path / "a", missing) == (1, "3 passed, 1 failed, 1 skipped\n")
 
 
+def test_what_was_left_out_is_said_at_the_end_and_once_for_a_ci_run(tmp_path: Path) -> None:
+    for part in ("a", "b"):
+        (tmp_path / part).mkdir()
+        (tmp_path / part / "pytest.xml").write_text(PYTEST_GOOD)
+        (tmp_path / part / "pytest.status").write_text("0")
+        line = "2 passed, 0 failed, 1 skipped (left out: LIO-SAM)\n"
+        assert close(tmp_path / part, "--pytest", "--left-out", "LIO-SAM") == (0, line)
+    counts = [tmp_path / part / "counts" for part in ("a", "b")]
+    assert close("--sum", *counts) == (0, "4 passed, 0 failed, 2 skipped (left out: LIO-SAM)\n")
+
+
 # --- through the front door, with fake ctest and pytest
 
 
