@@ -1,19 +1,19 @@
 # SPDX-FileCopyrightText: 2026 D2-LIO contributors
 # SPDX-License-Identifier: BSD-3-Clause
-"""The estimators that `d2lio run` can drive, and the parameters a source suggests to them."""
+"""The estimators that `d2lio run` can drive."""
 
 from __future__ import annotations
 
-import math
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
+from importlib.util import find_spec
 from typing import Any, Protocol
 
 import numpy as np
 
-from d2lio.datasets.config import SourceConfig
 from d2lio.errors import ConfigError, DataError
 
 REJECTION_MODES = ("off", "none", "fixed", "kiss", "point_adaptive")
+LIOSAM_MODULE = "d2lio._liosam"
 
 
 class ScanResult(Protocol):
@@ -41,8 +41,18 @@ class ScanResult(Protocol):
 class Host(Protocol):
     """What every estimator offers (the C++ hosts do)."""
 
-    def add_imu(self, stamps: np.ndarray, gyro: np.ndarray, accel: np.ndarray) -> None:
-        """Samples: int64 [N] ns, float64 [N, 3] rad/s, float64 [N, 3] m/s^2."""
+    def add_imu(
+        self,
+        stamps: np.ndarray,
+        gyro: np.ndarray,
+        accel: np.ndarray,
+        orientation: np.ndarray | None = None,
+    ) -> None:
+        """Samples: int64 [N] ns, float64 [N, 3] rad/s, float64 [N, 3] m/s^2.
+
+        `orientation` is that of a 9-axis IMU, float64 [N, 4], x y z w of R_world_imu; rows of zeros
+        where there is none.
+        """
 
     def add_scan(
         self,
@@ -75,7 +85,32 @@ def _fastlio() -> Any:
     return FastLioHost
 
 
-HOSTS: dict[str, Callable[[], Any]] = {"fastlio": _fastlio}
+def _liosam(name: str) -> Any:
+    why = liosam_missing()
+    if why is not None:
+        raise DataError(why)
+    from d2lio import _liosam as module
+
+    return getattr(module, name)
+
+
+def liosam_missing() -> str | None:
+    """Why the LIO-SAM host and D²-LIO cannot be had here; None where they can."""
+    if find_spec(LIOSAM_MODULE) is not None:
+        return None
+    return (
+        "the LIO-SAM host and D²-LIO are not built: this installation was made without GTSAM 4.2; "
+        "run `D2LIO_GTSAM=on ./d2lio setup`, or `pip install .` where CMake finds GTSAM"
+    )
+
+
+HOSTS: dict[str, Callable[[], Any]] = {
+    "fastlio": _fastlio,
+    "liosam": lambda: _liosam("LioSamHost"),
+    "d2lio": lambda: _liosam("D2LioHost"),
+}
+NEED_GTSAM = ("liosam", "d2lio")
+TITLES = {"fastlio": "FAST-LIO2 host", "liosam": "LIO-SAM host", "d2lio": "D²-LIO"}
 
 
 def load_host(name: str) -> Any:
@@ -92,68 +127,3 @@ def load_host(name: str) -> Any:
 def describe(name: str) -> list[dict[str, str]]:
     """Key, type, default, range, unit and doc of every parameter of a host."""
     return [{k: str(v) for k, v in entry.items()} for entry in load_host(name).describe()]
-
-
-def _numbers(values: np.ndarray) -> str:
-    return "[" + ", ".join(repr(float(v)) for v in np.asarray(values).ravel()) + "]"
-
-
-def stride_for(rings: int) -> int:
-    """Point stride that keeps every ring: 1 up to 32 rings, else 3.
-
-    A stride that shares a factor with the ring count silently removes whole rings of
-    column-ordered clouds; 3 shares none with 64 and 128.
-    """
-    return 1 if rings <= 32 else 3
-
-
-def source_params(config: SourceConfig) -> dict[str, str]:
-    """Host parameters that follow from the source: extrinsic, ranges, stride."""
-    pose = config.extrinsic
-    params = {
-        "mapping.extrinsic_T": _numbers(pose[:3, 3]),
-        "mapping.extrinsic_R": _numbers(pose[:3, :3]),
-        "preprocess.blind": repr(config.lidar.min_range_m),
-        "point_filter_num": str(stride_for(config.lidar.rings)),
-    }
-    if math.isfinite(config.lidar.max_range_m):
-        params["preprocess.max_range"] = repr(config.lidar.max_range_m)
-        params["mapping.det_range"] = repr(config.lidar.max_range_m)
-    params.update({key: _text(value) for key, value in config.host.items()})
-    return params
-
-
-def _text(value: object) -> str:
-    if isinstance(value, bool):
-        return "true" if value else "false"
-    if isinstance(value, list):
-        return _numbers(np.asarray(value))
-    return str(value)
-
-
-def parse_assignments(assignments: list[str]) -> dict[str, str]:
-    """`key=value` texts as a mapping.
-
-    Raises:
-        ConfigError: a text without `=` or without a key.
-    """
-    params = {}
-    for text in assignments:
-        key, separator, value = text.partition("=")
-        if not separator or not key.strip():
-            raise ConfigError("--set", text, "key=value")
-        params[key.strip()] = value.strip()
-    return params
-
-
-def all_params(
-    config: SourceConfig, rejection: str | None, degeneracy: str | None, extra: Mapping[str, str]
-) -> dict[str, str]:
-    """Source parameters, then mode and method, then `--set`; later ones win."""
-    params = source_params(config)
-    if rejection is not None:
-        params["rejection.mode"] = rejection
-    if degeneracy is not None:
-        params["degeneracy.method"] = degeneracy
-    params.update(extra)
-    return params

@@ -19,9 +19,10 @@ from d2lio import __version__
 from d2lio.datasets import ImuBlock, Source, timed_events
 from d2lio.datasets.events import Event
 from d2lio.errors import ConfigError
-from d2lio.hosts import Host, ScanResult, all_params, load_host
+from d2lio.hosts import Host, ScanResult, load_host
 from d2lio.output import OutputDir, ResultWriter
 from d2lio.record import RunRecord, ScanCounts, StageTime
+from d2lio.source_params import all_params
 
 DIVERGED_M = 1e5  # no sequence of ours leads that far from its start
 
@@ -149,7 +150,7 @@ def _feed(
     events = timed_events(source.reader, log_times=source.log_times)
     while (event := _timed_next(events, tally)) is not None:
         if isinstance(event, ImuBlock):
-            host.add_imu(event.stamps, event.gyro, event.accel)
+            host.add_imu(event.stamps, event.gyro, event.accel, event.orientation)
         elif options.max_scans is not None and tally.scans_fed >= options.max_scans:
             break
         else:
@@ -178,8 +179,11 @@ def run(
     """
     if options.threads < 1:
         raise ConfigError("threads", options.threads, ">= 1")
-    params = all_params(source.config, options.rejection, options.degeneracy, options.params)
-    host = load_host(options.host)(params, options.threads)
+    make_host = load_host(options.host)
+    params = all_params(
+        source.config, options.host, options.rejection, options.degeneracy, options.params
+    )
+    host = make_host(params, options.threads)
     tally = _Tally()
     begin = time.perf_counter()
     with OutputDir(out) as directory:

@@ -42,13 +42,20 @@ def header(store, stamp: int, frame: str = "lidar"):
     return types["std_msgs/msg/Header"](time, frame)
 
 
-def imu_message(store, stamp: int, gyro=(0.0, 0.0, 0.0), accel=(0.0, 0.0, 9.81)):
+def imu_message(
+    store,
+    stamp: int,
+    gyro=(0.0, 0.0, 0.0),
+    accel=(0.0, 0.0, 9.81),
+    orientation=(0.0, 0.0, 0.0, 1.0),
+    orientation_variance: float = 0.0,
+):
     types = store.types
     vector = types["geometry_msgs/msg/Vector3"]
     return types["sensor_msgs/msg/Imu"](
         header(store, stamp, "imu"),
-        types["geometry_msgs/msg/Quaternion"](0.0, 0.0, 0.0, 1.0),
-        np.zeros(9),
+        types["geometry_msgs/msg/Quaternion"](*orientation),
+        np.diag([orientation_variance] * 3).ravel(),
         vector(*gyro),
         np.zeros(9),
         vector(*accel),

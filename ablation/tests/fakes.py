@@ -40,6 +40,7 @@ class FakeHost:
         self._finished = False
         self._done = 0
         self.imu_samples = 0
+        self.orientations = 0
 
     @staticmethod
     def describe() -> list[dict[str, str]]:
@@ -55,8 +56,16 @@ class FakeHost:
             for key in FakeHost.KEYS
         ]
 
-    def add_imu(self, stamps: np.ndarray, gyro: np.ndarray, accel: np.ndarray) -> None:
+    def add_imu(
+        self,
+        stamps: np.ndarray,
+        gyro: np.ndarray,
+        accel: np.ndarray,
+        orientation: np.ndarray | None = None,
+    ) -> None:
         assert gyro.shape == accel.shape == (len(stamps), 3)
+        assert orientation is None or orientation.shape == (len(stamps), 4)
+        self.orientations += 0 if orientation is None else int(orientation.any(axis=1).sum())
         self.imu_samples += len(stamps)
         self._newest_imu = int(stamps[-1])
 
@@ -103,4 +112,4 @@ class FakeHost:
         return np.zeros((0, 3), np.float32)
 
     def counts(self) -> dict[str, int]:
-        return {"epochs": 1, "scans_dropped_late": 0}
+        return {"epochs": 1, "scans_dropped_late": 0, "orientations": self.orientations}

@@ -9,15 +9,26 @@ from pathlib import Path
 import numpy as np
 import pytest
 from d2lio.datasets import ImuBlock, Scan, open_source, timed_events
-from d2lio.datasets.kitti import GRAVITY, Oxts, extrinsic, read_oxts, rebuild_imu
+from d2lio.datasets.kitti import (
+    GRAVITY,
+    RINGS,
+    Oxts,
+    extrinsic,
+    read_oxts,
+    rebuild_imu,
+    rings_by_turns,
+)
 from d2lio.errors import DataError
 from d2lio.metrics import read_tum
+from scipy.spatial.transform import Rotation
 
 NS = 1_000_000_000
 KITTI = "kitti_raw_2011_09_26_drive_0001"
 # The speed is printed at 10 Hz with stamps of 10 ms; 107 m are driven.
 END_ERROR_M = 1.5
 YAW_ERROR_RAD = 0.01
+ATTITUDE_ERROR_RAD = 2e-3  # ground truth and OXTS rows are rounded apart
+RING_SPREAD_DEG = 0.35  # within a ring of a scan: the published points are corrected for offsets
 
 
 def oxts(yaw_rate: float = 0.0, accel: float = 0.0, pitch: float = 0.0, speed: float = 10.0):
@@ -97,10 +108,55 @@ def test_real_drive_in_order_with_truth(real_data) -> None:
         assert isinstance(event, Scan)
         assert 0 <= event.stamp - newest_imu < NS // 100
         assert not event.dt_ns.any()
+        assert event.ring is not None
+        assert np.array_equal(np.unique(event.ring), np.arange(RINGS))
         scans += 1
         if scans == 3:
             assert len(event) > 100_000
             break
+
+
+def test_rings_of_a_real_scan_lie_one_above_the_other(real_data) -> None:
+    with np.load(sorted((real_data(KITTI) / "scans").glob("*.npz"))[0]) as data:
+        xyz = data["xyz"]
+    ring = rings_by_turns(xyz)
+    assert ring is not None
+    elevation = np.rad2deg(np.arctan2(xyz[:, 2], np.hypot(xyz[:, 0], xyz[:, 1])))
+    centre = np.array([np.median(elevation[ring == r]) for r in range(RINGS)])
+    spread = np.array([elevation[ring == r].std() for r in range(RINGS)])
+    assert np.all(np.diff(centre) > 0.0)
+    assert np.all(spread < RING_SPREAD_DEG)
+    assert centre[0] == pytest.approx(-24.0, abs=1.0)
+    assert centre[-1] == pytest.approx(2.0, abs=1.0)
+
+
+def test_rings_by_turns() -> None:
+    turn = np.linspace(0.05, 2 * np.pi - 0.05, 40)
+    azimuth = np.concatenate([turn, turn[3:], turn[:-5]])
+    xyz = np.stack([np.cos(azimuth), np.sin(azimuth), 0 * azimuth], axis=1).astype(np.float32)
+    expected = np.repeat([63, 62, 61], [40, 37, 35])
+    assert rings_by_turns(xyz).tolist() == expected.tolist()
+    shuffled = np.random.default_rng(0).permutation(np.tile(xyz, (9, 1)))
+    assert rings_by_turns(shuffled) is None
+
+
+def test_attitude_of_the_drive_is_given_when_asked_for(tmp_path: Path, real_data) -> None:
+    folder = real_data(KITTI)
+    silent = next(iter(open_source(folder).reader.raw_events()))
+    assert isinstance(silent, ImuBlock)
+    assert silent.orientation is None
+    config = tmp_path / "kitti.yaml"
+    config.write_text("lidar: {synchronised: true}\nimu: {orientation: true}\n")
+    events = open_source(folder, config).reader.raw_events()
+    blocks = [event for event in events if isinstance(event, ImuBlock)]
+    stamps = np.concatenate([block.stamps for block in blocks])
+    given = Rotation.from_quat(np.concatenate([block.orientation for block in blocks]))
+    truth = read_tum(folder / "gt_imu_tum.txt")
+    at = np.searchsorted(stamps, truth.stamps)
+    # Both are attitudes of the same unit; the truth starts at its first pose.
+    turned = given[at[0]].inv() * given[at]
+    error = turned.inv() * Rotation.from_quat(truth.quaternions)
+    assert error.magnitude().max() < ATTITUDE_ERROR_RAD
 
 
 def test_integrating_the_rebuilt_imu_follows_the_real_truth(real_data) -> None:

@@ -6,7 +6,6 @@ from __future__ import annotations
 
 import csv
 import errno
-import json
 from pathlib import Path
 
 import numpy as np
@@ -16,7 +15,6 @@ from d2lio.cli import app
 from d2lio.datasets import open_source
 from d2lio.datasets.source import Source
 from d2lio.errors import ConfigError, DataError
-from d2lio.hosts import parse_assignments, source_params, stride_for
 from d2lio.output import OutputDir, ResultWriter, tum_line
 from d2lio.record import RunRecord
 from d2lio.runner import Interrupted, RunOptions, run
@@ -140,26 +138,6 @@ def test_existing_directory_that_is_no_run_is_refused(tmp_path: Path) -> None:
     with pytest.raises(DataError, match="is not a run"):
         OutputDir(target)
     assert (target / "chapter1.tex").exists()
-
-
-def test_parameters_from_the_source(source: Source) -> None:
-    params = source_params(source.config)
-    assert params["preprocess.max_range"] == "80.0"
-    assert json.loads(params["mapping.extrinsic_R"]) == np.eye(3).ravel().tolist()
-    assert params["point_filter_num"] == "1"
-
-
-@pytest.mark.parametrize("rings", [0, 6, 16, 32, 64, 128])
-def test_stride_keeps_every_ring(rings: int) -> None:
-    kept = np.arange(0, 100 * max(rings, 1), stride_for(rings)) % max(rings, 1)
-    assert len(np.unique(kept)) == max(rings, 1)
-
-
-def test_assignments() -> None:
-    assert parse_assignments(["a.b=1", "c = x=y"]) == {"a.b": "1", "c": "x=y"}
-    for text in ("a.b", "=3"):
-        with pytest.raises(ConfigError, match="key=value"):
-            parse_assignments([text])
 
 
 def test_tum_line_holds_every_digit() -> None:

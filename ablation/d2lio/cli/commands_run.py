@@ -28,6 +28,8 @@ if TYPE_CHECKING:
     from d2lio.metrics import Evaluation
     from d2lio.record import RunRecord
 
+DEFAULT_HOST = "fastlio"
+HostOption = Annotated[str, typer.Option(help="fastlio, liosam or d2lio.")]
 JsonOption = Annotated[bool, typer.Option("--json", help="Machine-readable result on stdout.")]
 ThreadsOption = Annotated[int, typer.Option(min=1, help="Threads of the estimator.")]
 
@@ -39,11 +41,14 @@ def run(
     config: Annotated[
         Path | None, typer.Option(help="YAML for a bag: topics, extrinsic, times.")
     ] = None,
-    host: Annotated[str, typer.Option(help="Estimator.")] = "fastlio",
+    host: HostOption = DEFAULT_HOST,
     rejection: Annotated[
-        str | None, typer.Option(help="off, none, fixed, kiss or point_adaptive.")
+        str | None,
+        typer.Option(help="off, none, fixed, kiss or point_adaptive; unset is the host's own."),
     ] = None,
-    degeneracy: Annotated[str | None, typer.Option(help="none, paper or remap.")] = None,
+    degeneracy: Annotated[
+        str | None, typer.Option(help="none, paper or remap; unset is the host's own.")
+    ] = None,
     assignments: Annotated[
         list[str] | None, typer.Option("--set", metavar="KEY=VALUE", help="Host parameter.")
     ] = None,
@@ -58,7 +63,7 @@ def run(
     """Run an estimator over recorded data: trajectory.tum, diagnostics.csv, run.json."""
     from d2lio import runner
     from d2lio.datasets import open_source
-    from d2lio.hosts import parse_assignments
+    from d2lio.source_params import parse_assignments
 
     with guard():
         source = open_source(sequence, config, stamps)
@@ -189,6 +194,9 @@ def simulate(
     imu: Annotated[str, typer.Option(help="IMU grade.")] = "industrial",
     seed: Annotated[int, typer.Option(min=0, help="Same seed, same bytes.")] = 0,
     duration: Annotated[float | None, typer.Option(help="s; default of the scene.")] = None,
+    orientation: Annotated[
+        bool, typer.Option("--orientation", help="A 9-axis IMU: messages with an attitude.")
+    ] = False,
     out: Annotated[Path | None, typer.Option(help="Sequence directory to make.")] = None,
     as_json: JsonOption = False,
 ) -> None:
@@ -203,7 +211,14 @@ def simulate(
         target = out or Path("sequences") / name
         with progress_bar(name) as update:
             made = simulator.simulate(
-                scene, target, sensor=sensor, seed=seed, duration=duration, imu=imu, progress=update
+                scene,
+                target,
+                sensor=sensor,
+                seed=seed,
+                duration=duration,
+                imu=imu,
+                orientation=orientation,
+                progress=update,
             )
         if as_json:
             emit_json(json.dumps({"sequence": made.name, "path": str(target)}))
@@ -231,29 +246,32 @@ def _list_registries(as_json: bool) -> None:
 
 
 def params(
-    host: Annotated[str, typer.Option(help="Estimator.")] = "fastlio",
+    host: Annotated[
+        str, typer.Option(help="fastlio, liosam, d2lio, or all of them.")
+    ] = DEFAULT_HOST,
     markdown: Annotated[bool, typer.Option("--markdown", help="A page for the manual.")] = False,
     as_json: JsonOption = False,
 ) -> None:
     """Show every parameter: key, type, default, range, unit, meaning."""
-    from d2lio.hosts import describe
+    from d2lio.hosts import HOSTS, describe
     from d2lio.params import to_markdown
 
     with guard():
-        entries = describe(host)
+        entries = {name: describe(name) for name in (HOSTS if host == "all" else [host])}
         if markdown and as_json:
             complain("--markdown and --json exclude each other")
             raise typer.Exit(EXIT_USAGE)
         if as_json:
-            emit_json(json.dumps(entries, indent=2))
+            emit_json(json.dumps(entries if host == "all" else entries[host], indent=2))
         elif markdown:
-            sys.stdout.write(to_markdown(host, entries))
+            sys.stdout.write(to_markdown(entries))
         else:
-            _print_params(entries)
+            for name in entries:
+                _print_params(name, entries[name])
 
 
-def _print_params(entries: list[dict[str, str]]) -> None:
-    table = Table()
+def _print_params(host: str, entries: list[dict[str, str]]) -> None:
+    table = Table(title=f"host {host}")
     for column in ("key", "type", "default", "range", "unit", "doc"):
         table.add_column(column, overflow="fold", no_wrap=column == "key")
     for entry in entries:

@@ -4,6 +4,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
@@ -21,10 +22,26 @@ from d2lio.errors import DataError
 CLOUD_TYPES = ("sensor_msgs/msg/PointCloud2", *LIVOX_TYPES)
 IMU_TYPES = ("sensor_msgs/msg/Imu",)
 STANDARD_GRAVITY = 9.80665  # m/s^2 per g
+UNIT_TOLERANCE = 1e-2  # of a quaternion's norm; single precision and rounding drivers stay below
+NO_ROTATION = (0.0, 0.0, 0.0, 1.0)
 
 
 def _stamp(header: Any) -> int:
     return int(header.stamp.sec) * NS_PER_S + int(header.stamp.nanosec)
+
+
+def orientation_of(imu: Any) -> tuple[float, float, float, float] | None:
+    """x y z w of a sensor_msgs/Imu, None where it has no orientation.
+
+    By the message's definition orientation_covariance[0] == -1 says so. Drivers of 6-axis IMUs
+    that do not set it leave zeros or exactly the identity, which no attitude filter gives.
+    """
+    q = (imu.orientation.x, imu.orientation.y, imu.orientation.z, imu.orientation.w)
+    norm = math.sqrt(sum(value * value for value in q))
+    unit = abs(norm - 1.0) <= UNIT_TOLERANCE  # False for NaN as well
+    if float(imu.orientation_covariance[0]) == -1.0 or not unit or q == NO_ROTATION:
+        return None
+    return (q[0] / norm, q[1] / norm, q[2] / norm, q[3] / norm)
 
 
 class BagReader:
@@ -122,7 +139,9 @@ class BagReader:
         k = STANDARD_GRAVITY if self._config.imu.accel_unit == "g" else 1.0
         log_times = self._config.stamps == "log"
         stamp = message.log_stamp if log_times else _stamp(imu.header)
-        return ImuMessage(stamp, message.log_stamp, (w.x, w.y, w.z, k * f.x, k * f.y, k * f.z))
+        values = (w.x, w.y, w.z, k * f.x, k * f.y, k * f.z)
+        orientation = None if self._config.imu.orientation is False else orientation_of(imu)
+        return ImuMessage(stamp, message.log_stamp, values, orientation)
 
     def _decode_scan(self, message: Message) -> RawScan:
         if message.msgtype in LIVOX_TYPES:

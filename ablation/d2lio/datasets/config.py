@@ -18,16 +18,25 @@ from d2lio.sequence import RigidRows, Sequence
 IDENTITY = [[float(i == j) for j in range(4)] for i in range(4)]
 
 
+ParamValue = str | float | int | bool | list[float]
+HostName = Literal["fastlio", "liosam", "d2lio"]
+
+
 class _Strict(BaseModel):
     model_config = ConfigDict(extra="forbid", protected_namespaces=())
 
 
 class LidarSource(_Strict):
-    """LiDAR stream. `topic` and `time_field` may be left out where only one fits."""
+    """LiDAR stream. `topic` and `time_field` may be left out where only one fits.
+
+    `columns` are firings of a ring in a turn (Livox: points of a line in a scan), 0 those of the
+    model; only LIO-SAM's range image needs them.
+    """
 
     topic: str | None = None
     model: str = ""
     rings: Annotated[int, Field(ge=0, le=1024)] = 0  # 0: unknown
+    columns: Annotated[int, Field(ge=0, le=16384)] = 0
     rate_hz: Annotated[float, Field(gt=0.0)] = 10.0
     min_range_m: Annotated[float, Field(ge=0.0)] = 0.5
     max_range_m: Annotated[float, Field(gt=0.0)] = 100.0
@@ -39,11 +48,16 @@ class LidarSource(_Strict):
 
 
 class ImuSource(_Strict):
-    """IMU stream; `accel_unit` g multiplies the accelerations by 9.80665 m/s^2."""
+    """IMU stream; `accel_unit` g multiplies the accelerations by 9.80665 m/s^2.
+
+    `orientation`: whether the orientation of a 9-axis IMU is handed on; unset is yes for bags whose
+    messages have one, and no for KITTI, where it comes from the ground truth's unit.
+    """
 
     topic: str | None = None
     rate_hz: Annotated[float, Field(gt=0.0)] = 200.0
     accel_unit: Literal["m/s^2", "g"] = "m/s^2"
+    orientation: bool | None = None
 
 
 class SourceConfig(_Strict):
@@ -54,7 +68,8 @@ class SourceConfig(_Strict):
         T_imu_lidar: 4x4 by rows, maps LiDAR points to the IMU frame, m.
         stamps: header, or log (times of reception, for sources whose clocks differ).
         ground_truth: TUM file, relative to the configuration file.
-        host: host parameters by key, applied before `--set`.
+        host: host parameters by key, for whatever host, applied before `--set`.
+        hosts: host parameters by host and key, applied after `host`.
     """
 
     name: str = ""
@@ -63,7 +78,8 @@ class SourceConfig(_Strict):
     ground_truth: str | None = None
     lidar: LidarSource = LidarSource()
     imu: ImuSource = ImuSource()
-    host: dict[str, str | float | int | bool | list[float]] = {}
+    host: dict[str, ParamValue] = {}
+    hosts: dict[HostName, dict[str, ParamValue]] = {}
 
     @property
     def extrinsic(self) -> np.ndarray:

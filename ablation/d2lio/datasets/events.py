@@ -26,11 +26,14 @@ class ImuBlock:
         stamps: int64 [N], ns.
         gyro: float64 [N, 3], angular rate, rad/s.
         accel: float64 [N, 3], specific force, m/s^2 (+g upwards at rest).
+        orientation: float64 [N, 4], x y z w of R_world_imu of a 9-axis IMU, rows of zeros where a
+            sample has none; None where no sample has one.
     """
 
     stamps: Int64
     gyro: Float64
     accel: Float64
+    orientation: Float64 | None = None
 
     def __len__(self) -> int:
         return len(self.stamps)

@@ -22,6 +22,7 @@ from d2lio.datasets.events import NS_PER_S, ImuBlock, Notes, RawEvent, RawScan, 
 from d2lio.errors import DataError
 
 IMU_RATE_HZ = 100
+RINGS = 64  # of the HDL-64E
 GRAVITY = 9.81  # m/s^2
 LEAD_S = 0.3  # IMU samples before the first and after the last scan
 
@@ -86,7 +87,7 @@ def _nanoseconds(text: str) -> int:
     return int(whole) * NS_PER_S + int(fraction.ljust(9, "0")[:9])
 
 
-def rebuild_imu(oxts: Oxts, rate_hz: int = IMU_RATE_HZ) -> ImuBlock:
+def rebuild_imu(oxts: Oxts, rate_hz: int = IMU_RATE_HZ, *, orientation: bool = False) -> ImuBlock:
     """IMU samples from LEAD_S before the first scan to LEAD_S after the last.
 
     Angular rate: roll and pitch rates from a spline through the attitudes, yaw rate as measured.
@@ -110,18 +111,27 @@ def rebuild_imu(oxts: Oxts, rate_hz: int = IMU_RATE_HZ) -> ImuBlock:
     )
     level = np.stack([forward, speed * yaw_rate, np.full_like(speed, GRAVITY)], axis=1)
     tilt = Rotation.from_euler("ZYX", np.stack([np.zeros_like(roll), pitch, roll], axis=1))
-    return ImuBlock(stamps, gyro, tilt.inv().apply(level))
+    attitude = None
+    if orientation:
+        yaw = CubicSpline(t, angles[:, 2])(inside)
+        attitude = (Rotation.from_euler("Z", yaw[:, None]) * tilt).as_quat()
+    return ImuBlock(stamps, gyro, tilt.inv().apply(level), attitude)
 
 
 class KittiReader:
     """Reads the directory; opening checks that scans and oxts.csv belong together.
 
+    Args:
+        path: the directory.
+        orientation: give the attitude of the OXTS unit, which the ground truth comes from as well.
+
     Raises:
         DataError: files missing or of different number.
     """
 
-    def __init__(self, path: Path) -> None:
+    def __init__(self, path: Path, *, orientation: bool = False) -> None:
         self._path = path
+        self._orientation = orientation
         self.notes = Notes()
         self.time_hint = TimeHint(synchronised=True)
         self._oxts = read_oxts(path / "oxts.csv")
@@ -144,7 +154,7 @@ class KittiReader:
 
     def raw_events(self) -> Iterator[RawEvent]:
         """Events in order of time; see `Reader`."""
-        imu = rebuild_imu(self._oxts)
+        imu = rebuild_imu(self._oxts, orientation=self._orientation)
         begin = 0
         for stamp, file in zip(self._oxts.stamps.tolist(), self._scans, strict=True):
             end = int(np.searchsorted(imu.stamps, stamp, side="right"))
@@ -161,8 +171,32 @@ class KittiReader:
                 intensity = data["intensity"].astype(np.float32)
         except (OSError, KeyError, ValueError) as err:
             raise DataError(f"{file}: cannot be read: {err}") from None
-        return RawScan(stamp, stamp, xyz, None, intensity, None)
+        ring = rings_by_turns(xyz)
+        if ring is None:
+            self.notes.tell(f"{file.name}: the points do not come ring by ring; they get no rings")
+        return RawScan(stamp, stamp, xyz, None, intensity, ring)
+
+
+def rings_by_turns(xyz: np.ndarray) -> np.ndarray | None:
+    """Ring of every point of a KITTI scan, which its file does not hold.
+
+    The points come ring by ring from the top one down, each counter-clockwise from straight ahead:
+    the azimuth in [0, 2 pi) falls back once between rings. Elevation would not do: the lasers of
+    an HDL-64E are spaced unevenly, and the published points are corrected for their offsets.
+
+    Args:
+        xyz: float32 [N, 3], LiDAR frame, in the order of the file.
+
+    Returns:
+        uint16 [N], 0 the lowest; None where more turns than rings are found.
+    """
+    azimuth = np.arctan2(xyz[:, 1], xyz[:, 0]) % (2.0 * np.pi)
+    turns = np.concatenate([[0], np.cumsum(np.diff(azimuth) < -np.pi)])
+    if turns[-1] >= RINGS:
+        return None
+    return (RINGS - 1 - turns).astype(np.uint16)
 
 
 def _part(imu: ImuBlock, begin: int, end: int) -> ImuBlock:
-    return ImuBlock(imu.stamps[begin:end], imu.gyro[begin:end], imu.accel[begin:end])
+    attitude = None if imu.orientation is None else imu.orientation[begin:end]
+    return ImuBlock(imu.stamps[begin:end], imu.gyro[begin:end], imu.accel[begin:end], attitude)

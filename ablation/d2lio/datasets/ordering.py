@@ -19,11 +19,15 @@ MAX_IMU_BLOCK = 1024  # samples
 
 @dataclass(frozen=True, slots=True)
 class ImuMessage:
-    """One IMU sample: stamp in ns, (gyro x y z, accel x y z) in rad/s and m/s^2."""
+    """One IMU sample: stamp in ns, (gyro x y z, accel x y z) in rad/s and m/s^2.
+
+    `orientation` is x y z w of R_world_imu, None for a 6-axis IMU.
+    """
 
     stamp: int
     log_stamp: int
     values: tuple[float, float, float, float, float, float]
+    orientation: tuple[float, float, float, float] | None = None
 
 
 class _Gatherer:
@@ -80,7 +84,14 @@ class _Gatherer:
         ordered, self._imu = ordered[:ready], ordered[ready:]
         values = np.array([m.values for m in ordered], np.float64)
         stamps = np.array([m.stamp for m in ordered], np.int64)
-        yield ImuBlock(stamps, values[:, :3].copy(), values[:, 3:].copy())
+        yield ImuBlock(stamps, values[:, :3].copy(), values[:, 3:].copy(), _orientation(ordered))
+
+
+def _orientation(messages: list[ImuMessage]) -> np.ndarray | None:
+    """x y z w [N, 4], zeros where a message has none; None where none has."""
+    if all(m.orientation is None for m in messages):
+        return None
+    return np.array([m.orientation or (0.0, 0.0, 0.0, 0.0) for m in messages], np.float64)
 
 
 def gather(messages: Iterable[ImuMessage | RawScan], notes: Notes) -> Iterator[RawEvent]:

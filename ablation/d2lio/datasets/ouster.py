@@ -91,6 +91,7 @@ class OusterReader:
         lidar = LidarSource(
             model=str(self._info.prod_line),
             rings=self._info.h,
+            columns=self._info.w,
             rate_hz=float(self._info.format.fps) or 10.0,
             min_range_m=0.5,
             max_range_m=120.0,

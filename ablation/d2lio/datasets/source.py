@@ -76,10 +76,20 @@ def _open_bag(path: Path, config_file: Path | None, stamps: str | None) -> Sourc
     config = SourceConfig() if config_file is None else SourceConfig.load(config_file)
     config = _with_stamps(config, stamps)
     reader = BagReader(path, config)
+    config = _named_after_messages(config, reader.lidar_topic.msgtype)
     if config_file is None:
         reader.notes.tell("no --config given: T_imu_lidar is taken as identity")
     truth = _beside(config, config_file)
     return Source(config.name or path.stem, reader, config, truth)
+
+
+def _named_after_messages(config: SourceConfig, msgtype: str) -> SourceConfig:
+    """The configuration, its LiDAR called a Livox where only the messages tell."""
+    from d2lio.datasets.livox import MESSAGE_TYPES
+
+    if config.lidar.model or msgtype not in MESSAGE_TYPES:
+        return config
+    return config.model_copy(update={"lidar": config.lidar.model_copy(update={"model": "livox"})})
 
 
 def _open_kitti(path: Path, config_file: Path | None) -> Source:
@@ -98,7 +108,8 @@ def _open_kitti(path: Path, config_file: Path | None) -> Source:
             imu=ImuSource(rate_hz=IMU_RATE_HZ),
         )
     truth = _beside(config, config_file) or _existing(path / KITTI_TRUTH)
-    return Source(config.name or path.name, KittiReader(path), config, truth)
+    reader = KittiReader(path, orientation=config.imu.orientation is True)
+    return Source(config.name or path.name, reader, config, truth)
 
 
 def _open_ouster(path: Path, config_file: Path | None) -> Source:

@@ -6,6 +6,7 @@ from __future__ import annotations
 
 from pathlib import Path
 from types import TracebackType
+from typing import NamedTuple
 
 import numpy as np
 from rosbags.rosbag1 import Writer
@@ -17,6 +18,13 @@ POINT = np.dtype(
 )  # fmt: skip
 _DATATYPE = {"<f4": 7, "<u2": 4}
 _NS = 1_000_000_000
+
+
+class Orientation(NamedTuple):
+    """x y z w of R_world_imu (4,), variances about x, y, z (3,) rad²."""
+
+    quaternion: np.ndarray
+    variance: tuple[float, float, float]
 
 
 class BagWriter:
@@ -76,18 +84,28 @@ class BagWriter:
         self._writer.write(self._lidar, arrival, data)
 
     def imu(
-        self, stamp: int, rate: np.ndarray, force: np.ndarray, variance: tuple[float, float]
+        self,
+        stamp: int,
+        rate: np.ndarray,
+        force: np.ndarray,
+        variance: tuple[float, float],
+        orientation: Orientation | None = None,
     ) -> None:
         """Write one sample: rate (3,) rad/s, force (3,) m/s², variances of the two."""
         types = self._types
         vector = types["geometry_msgs/msg/Vector3"]
         quaternion = types["geometry_msgs/msg/Quaternion"]
-        unknown = np.zeros(9)
-        unknown[0] = -1.0  # sensor_msgs/Imu: no orientation estimate
+        if orientation is None:
+            q = np.array([0.0, 0.0, 0.0, 1.0])
+            spread = np.zeros(9)
+            spread[0] = -1.0  # sensor_msgs/Imu: no orientation estimate
+        else:
+            q = orientation.quaternion
+            spread = np.diag(orientation.variance).ravel()
         message = types["sensor_msgs/msg/Imu"](
             header=self._header("imu", stamp, "imu"),
-            orientation=quaternion(x=0.0, y=0.0, z=0.0, w=1.0),
-            orientation_covariance=unknown,
+            orientation=quaternion(x=float(q[0]), y=float(q[1]), z=float(q[2]), w=float(q[3])),
+            orientation_covariance=spread,
             angular_velocity=vector(*(float(value) for value in rate)),
             angular_velocity_covariance=np.diag([variance[0]] * 3).ravel(),
             linear_acceleration=vector(*(float(value) for value in force)),

@@ -7,8 +7,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.spatial.transform import Rotation
 
-from d2lio.simulator.trajectory import Trajectory
+from d2lio.simulator.trajectory import Trajectory, smooth_noise
 
 GRAVITY = 9.81  # m/s², along -z of the world
 RATE_HZ = 200
@@ -46,6 +47,30 @@ IMU_GRADES: dict[str, ImuGrade] = {
         5e-4, 3.5e-3, 1e-4, 1e-3, 1.5e-2, 1.2e-1, 8e-3, 8e-3,
     ),
 }  # fmt: skip
+
+
+@dataclass(frozen=True)
+class AhrsErrors:
+    """Error of an attitude filter, 1 σ in rad, wandering within a band in Hz."""
+
+    tilt: float = np.deg2rad(0.5)  # roll and pitch, each
+    heading: float = np.deg2rad(2.0)
+    tilt_band_hz: tuple[float, float] = (0.01, 0.1)
+    heading_band_hz: tuple[float, float] = (0.003, 0.02)
+
+
+def attitude(
+    trajectory: Trajectory,
+    stamps: np.ndarray,
+    rng: np.random.Generator,
+    errors: AhrsErrors = AhrsErrors(),
+) -> np.ndarray:
+    """Orientation as a 9-axis IMU gives it, x y z w of R_world_imu (n, 4), at stamps (n,) ns."""
+    t = stamps * 1e-9
+    level = [smooth_noise(t, rng, errors.tilt, errors.tilt_band_hz) for _ in range(2)]
+    heading = smooth_noise(t, rng, errors.heading, errors.heading_band_hz)
+    error = Rotation.from_euler("ZYX", np.column_stack([heading, *level]))
+    return (error * Rotation.from_quat(trajectory.quaternion(t))).as_quat(canonical=True)
 
 
 def sample_times(duration: float) -> np.ndarray:

@@ -20,7 +20,7 @@ from d2lio.sequence import FILE_NAME as SEQUENCE_FILE
 from d2lio.sequence import ImuInfo, LidarInfo, Sequence
 from d2lio.simulator import imu as imu_model
 from d2lio.simulator import returns
-from d2lio.simulator.bag import POINT, BagWriter
+from d2lio.simulator.bag import POINT, BagWriter, Orientation
 from d2lio.simulator.imu import IMU_GRADES, ImuGrade
 from d2lio.simulator.lidar import SCAN_NS, SENSORS, Rays, Sensor
 from d2lio.simulator.scenes import SCENES
@@ -77,6 +77,7 @@ def simulate(
     duration: float | None = None,
     imu: str = "industrial",
     range_noise: float | None = None,
+    orientation: bool = False,
     progress: Progress | None = None,
 ) -> Sequence:
     """Simulate a sequence into the directory out: data.bag, gt.tum, sequence.yaml.
@@ -91,6 +92,7 @@ def simulate(
         duration: s, standstill included; None takes the scene's own.
         imu: a key of IMU_GRADES.
         range_noise: 1 σ in m; None takes the sensor's own. 0 also turns range quantisation off.
+        orientation: the IMU has nine axes and gives its attitude, with an attitude filter's errors.
         progress: called with (scans done, scans in all).
 
     Raises:
@@ -110,11 +112,10 @@ def simulate(
     )
     sequence = _describe(f"{scene}_{sensor}_s{seeds.noise}", lidar, sensor, grade)
     scans = scan_world(world, lidar, sigma, _rng(scene, "range", seeds.noise), length)
-    noise = _rng(scene, "imu", seeds.noise)
+    samples = _imu_samples(world.trajectory, grade, scene, seeds, length, orientation)
 
     def write(directory: Path) -> None:
-        _write_bag(directory / BAG_FILE, world.trajectory, grade, noise, scans,
-                   _tell(progress, _scan_count(length)), length)  # fmt: skip
+        _write_bag(directory / BAG_FILE, samples, scans, _tell(progress, _scan_count(length)))
         _write_truth(directory / TRUTH_FILE, world.trajectory, length)
         sequence.save(directory)
 
@@ -191,28 +192,57 @@ def _describe(name: str, lidar: Sensor, model: str, grade: ImuGrade) -> Sequence
     )
 
 
-def _write_bag(
-    path: Path,
+@dataclass(frozen=True)
+class _ImuSamples:
+    """Stamps (n,) ns; rate rad/s, force m/s² (n, 3); variances; attitude x y z w (n, 4) or None."""
+
+    stamps: np.ndarray
+    rate: np.ndarray
+    force: np.ndarray
+    variance: tuple[float, float]
+    attitude: np.ndarray | None
+
+    def write(self, bag: BagWriter, i: int) -> None:
+        orientation = None
+        if self.attitude is not None:
+            error = imu_model.AhrsErrors()
+            variance = (error.tilt**2, error.tilt**2, error.heading**2)
+            orientation = Orientation(self.attitude[i], variance)
+        stamp = EPOCH_NS + int(self.stamps[i])
+        bag.imu(stamp, self.rate[i], self.force[i], self.variance, orientation)
+
+
+def _imu_samples(
     trajectory: Trajectory,
     grade: ImuGrade,
-    rng: np.random.Generator,
-    scans: Iterator[Scan],
-    tell: Callable[[int], None],
+    scene: str,
+    seeds: Seeds,
     duration: float,
-) -> None:
+    orientation: bool,
+) -> _ImuSamples:
     stamps = imu_model.sample_times(duration)
-    rate, force = imu_model.measure(trajectory, stamps, grade, rng)
+    rate, force = imu_model.measure(trajectory, stamps, grade, _rng(scene, "imu", seeds.noise))
     variance = (
         grade.gyro_noise**2 * imu_model.RATE_HZ,
         grade.accel_noise**2 * imu_model.RATE_HZ,
     )
+    attitude = None
+    if orientation:
+        attitude = imu_model.attitude(trajectory, stamps, _rng(scene, "attitude", seeds.noise))
+    return _ImuSamples(stamps, rate, force, variance, attitude)
+
+
+def _write_bag(
+    path: Path, samples: _ImuSamples, scans: Iterator[Scan], tell: Callable[[int], None]
+) -> None:
+    stamps = samples.stamps
     with BagWriter(path, LIDAR_TOPIC, IMU_TOPIC) as bag:
         sent = 0
 
         def send_imu(until: int) -> None:
             nonlocal sent
             while sent < len(stamps) and stamps[sent] <= until:
-                bag.imu(EPOCH_NS + int(stamps[sent]), rate[sent], force[sent], variance)
+                samples.write(bag, sent)
                 sent += 1
 
         for index, scan in enumerate(scans):
