@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 D2-LIO contributors
 # SPDX-License-Identifier: BSD-3-Clause
-"""Whole runs of the C++ host: the real drive, the real MCAP, the axis of a bare tunnel."""
+"""Whole runs of the C++ hosts: the real drive, the real MCAP, the axis of a bare tunnel."""
 
 from __future__ import annotations
 
@@ -8,6 +8,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from built import host_params
 from d2lio.datasets import open_source
 from d2lio.metrics import evaluate, read_tum
 from d2lio.metrics.tum import interpolate
@@ -22,11 +23,12 @@ AXIS_DEG = 2.0
 AXIS_SHARE = 0.95
 
 
+@pytest.mark.parametrize("host", host_params())
 @pytest.mark.parametrize("mode", ["off", "point_adaptive"])
-def test_real_drive_within_one_percent(mode: str, tmp_path: Path, real_data) -> None:
+def test_real_drive_within_one_percent(host: str, mode: str, tmp_path: Path, real_data) -> None:
     source = open_source(real_data(KITTI))
     assert source.ground_truth is not None
-    record = run(source, RunOptions(rejection=mode, threads=2), tmp_path / "run")
+    record = run(source, RunOptions(host=host, rejection=mode, threads=2), tmp_path / "run")
     assert record.status == "complete"
     assert record.scans.read == 108
     result, _ = evaluate(tmp_path / "run" / "trajectory.tum", source.ground_truth)
