@@ -12,14 +12,14 @@
 namespace d2lio::test {
 
 /// Parameters that fit SyntheticRoom.
-inline fastlio::ParamMap room_params(fastlio::ParamMap extra = {}) {
+inline ParamMap room_params(ParamMap extra = {}) {
     const Pose T = SyntheticRoom::T_imu_lidar();
     std::string R, t;
     for (int r = 0; r < 3; ++r) {
         t += std::to_string(T.t[r]) + " ";
         for (int c = 0; c < 3; ++c) R += std::to_string(T.R(r, c)) + " ";
     }
-    fastlio::ParamMap params{{"mapping.extrinsic_R", R},
+    ParamMap params{{"mapping.extrinsic_R", R},
                              {"mapping.extrinsic_T", t},
                              {"point_filter_num", "1"},
                              {"preprocess.blind", "0.3"}};
@@ -27,7 +27,7 @@ inline fastlio::ParamMap room_params(fastlio::ParamMap extra = {}) {
     return params;
 }
 
-inline void step_all(fastlio::Host& host, std::vector<fastlio::ScanResult>& out) {
+inline void step_all(fastlio::Host& host, std::vector<ScanResult>& out) {
     while (auto r = host.step()) out.push_back(std::move(*r));
 }
 
@@ -39,7 +39,7 @@ struct Drive {
     std::function<bool(int, Scan&)> edit = [](int, Scan&) { return true; };
 
     void feed(fastlio::Host& host, SyntheticRoom& room,
-              std::vector<fastlio::ScanResult>& out) const {
+              std::vector<ScanResult>& out) const {
         Stamp imu = start;
         for (int i = 0; i < scans; ++i) {
             const Stamp begin = start + i * SyntheticRoom::kScanPeriod;
@@ -54,11 +54,11 @@ struct Drive {
     }
 };
 
-inline std::vector<fastlio::ScanResult> run(const fastlio::ParamMap& extra = {}, int threads = 1,
+inline std::vector<ScanResult> run(const ParamMap& extra = {}, int threads = 1,
                                             const Drive& drive = {}) {
     SyntheticRoom room;
     fastlio::Host host(room_params(extra), threads);
-    std::vector<fastlio::ScanResult> out;
+    std::vector<ScanResult> out;
     drive.feed(host, room, out);
     host.finish();
     step_all(host, out);
@@ -67,16 +67,16 @@ inline std::vector<fastlio::ScanResult> run(const fastlio::ParamMap& extra = {},
 
 /// Largest distance (m) between estimate and truth, both relative to the first pose; infinity when
 /// fewer than `missing` short of all scans have a pose.
-inline double largest_error(const std::vector<fastlio::ScanResult>& results,
+inline double largest_error(const std::vector<ScanResult>& results,
                             std::size_t missing = 3) {
-    const fastlio::ScanResult* first = nullptr;
+    const ScanResult* first = nullptr;
     double worst = 0.0;
     std::size_t poses = 0;
     for (const auto& r : results) {
         if (!r.has_pose) continue;
         if (first == nullptr) first = &r;
         ++poses;
-        const auto truth = [](const fastlio::ScanResult& x) {
+        const auto truth = [](const ScanResult& x) {
             return SyntheticRoom::pose(seconds_between(x.stamp, SyntheticRoom::kStart));
         };
         const Pose estimated = first->state.T_map_imu().inverse() * r.state.T_map_imu();

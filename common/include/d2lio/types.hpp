@@ -34,6 +34,10 @@ struct ImuSample {
     Stamp stamp = 0;
     Vec3 gyro = Vec3::Zero();   ///< angular rate, rad/s
     Vec3 accel = Vec3::Zero();  ///< specific force, m/s^2 (+g upwards at rest)
+    /// Of a 9-axis sensor: unit quaternion x y z w of R_world_imu, z up; zeros where there is none.
+    Eigen::Vector4d orientation = Eigen::Vector4d::Zero();
+
+    bool has_orientation() const { return orientation.squaredNorm() > 0.25; }
 };
 
 /// One LiDAR return in the LiDAR frame, at its own time `Scan::stamp + dt_ns`.

@@ -2,18 +2,15 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "gate.hpp"
 
-#include <algorithm>
 #include <cmath>
-#include <limits>
 
 namespace d2lio::fastlio {
 
 using G = GateConstants;
 
 void Gate::begin_scan(std::size_t points) {
-    verdicts_.assign(points, Verdict::kFewNeighbours);
+    book_.begin_scan(points);
     planes_.resize(points);
-    thresholds_.assign(points, std::numeric_limits<float>::infinity());
 }
 
 Verdict Gate::fit(const Candidate& c, const Rejector& rejector) {
@@ -23,7 +20,7 @@ Verdict Gate::fit(const Candidate& c, const Rejector& rejector) {
         return Verdict::kFarNeighbours;
     }
     const double threshold = rejector.threshold(c.imu_range);
-    thresholds_[c.index] = static_cast<float>(threshold);
+    book_.set_threshold(c.index, threshold);
     if (!(static_cast<double>(sq[0]) <= threshold * threshold)) return Verdict::kThreshold;
 
     PlaneFitOptions options;
@@ -42,8 +39,8 @@ Verdict Gate::fit(const Candidate& c, const Rejector& rejector) {
 }
 
 Verdict Gate::accept(const Candidate& c, const Rejector& rejector, Correspondence* out) {
-    if (c.index >= verdicts_.size()) return Verdict::kFewNeighbours;
-    Verdict& verdict = verdicts_[c.index];
+    if (c.index >= book_.size()) return Verdict::kFewNeighbours;
+    Verdict& verdict = book_.verdict(c.index);
     if (c.fresh) verdict = fit(c, rejector);
     if (verdict != Verdict::kAccepted) return verdict;
 
@@ -57,27 +54,6 @@ Verdict Gate::accept(const Candidate& c, const Rejector& rejector, Correspondenc
     Eigen::Map<Eigen::Vector3f>(out->normal) = plane.normal;
     out->residual = residual;
     return verdict;
-}
-
-CorrespondenceCounts Gate::counts() const {
-    CorrespondenceCounts c;
-    int* const fields[] = {&c.accepted,       &c.few_neighbours, &c.far_neighbours, &c.threshold,
-                           &c.singular_plane, &c.plane_fit,      &c.residual};
-    for (const Verdict v : verdicts_) ++*fields[static_cast<std::size_t>(v)];
-    c.offered = static_cast<int>(verdicts_.size());
-    return c;
-}
-
-void Gate::threshold_statistics(ScanDiagnostics& out) {
-    const auto finite_end = std::partition(thresholds_.begin(), thresholds_.end(),
-                                           [](float t) { return std::isfinite(t); });
-    if (finite_end == thresholds_.begin()) return;
-    const auto middle = thresholds_.begin() + (finite_end - thresholds_.begin()) / 2;
-    std::nth_element(thresholds_.begin(), middle, finite_end);
-    const auto [low, high] = std::minmax_element(thresholds_.begin(), finite_end);
-    out.epsilon_min = static_cast<double>(*low);
-    out.epsilon_median = static_cast<double>(*middle);
-    out.epsilon_max = static_cast<double>(*high);
 }
 
 }  // namespace d2lio::fastlio

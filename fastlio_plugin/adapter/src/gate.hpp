@@ -4,9 +4,9 @@
 
 #include <vector>
 
-#include "d2lio/diagnostics/scan_diagnostics.hpp"
 #include "d2lio/fastlio/adapter.hpp"
 #include "d2lio/geometry/plane.hpp"
+#include "d2lio/plugin/verdict_book.hpp"
 #include "d2lio/rejection/rejector.hpp"
 
 namespace d2lio::fastlio {
@@ -26,16 +26,13 @@ class Gate {
     void begin_scan(std::size_t points);
     Verdict accept(const Candidate& candidate, const Rejector& rejector, Correspondence* out);
 
-    CorrespondenceCounts counts() const;
-    /// Minimum, median and maximum of the thresholds used; NaN where none was finite.
-    void threshold_statistics(ScanDiagnostics& out);
+    VerdictBook& book() { return book_; }
 
   private:
     Verdict fit(const Candidate& candidate, const Rejector& rejector);
 
-    std::vector<Verdict> verdicts_;
+    VerdictBook book_;
     std::vector<Plane> planes_;
-    std::vector<float> thresholds_;
 };
 
 }  // namespace d2lio::fastlio

@@ -2,10 +2,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "imu_processor.hpp"
 
-#include <algorithm>
-
-#include "d2lio/preprocess/imu_check.hpp"
-
 namespace d2lio::fastlio {
 namespace {
 
@@ -24,95 +20,46 @@ Mat23x23 initial_covariance() {
     return p.asDiagonal();
 }
 
-/// Readings that no start can be made from. Anything else that looks wrong is told, but scaling to
-/// 9.81 m/s^2 and averaging still work on it, as they do upstream.
-bool hopeless(ImuCheckStatus status) {
-    return status == ImuCheckStatus::kNotFinite || status == ImuCheckStatus::kNoGravity;
-}
-
 }  // namespace
 
 ImuProcessor::ImuProcessor(const HostConfig& config)
-    : init_samples_(config.init_samples),
-      extrinsic_(config.extrinsic()),
+    : extrinsic_(config.intake.extrinsic()),
       Q_(config.noise.matrix()),
-      exact_(config.exact_jacobians) {}
+      exact_(config.exact_jacobians),
+      start_(config.intake.init_samples) {}
 
 void ImuProcessor::reset() {
-    initialised_ = has_last_end_ = false;
-    count_ = 0;
-    seen_.clear();
-    note_.clear();
+    initialised_ = false;
+    start_.reset();
+    stepper_.reset();
 }
 
 bool ImuProcessor::initialise(const std::vector<ImuSample>& samples, NavState& x, Mat23x23& P) {
-    for (const ImuSample& s : samples) {
-        if (count_ == 0) mean_accel_ = mean_gyro_ = Vec3::Zero();
-        ++count_;
-        mean_accel_ += (s.accel - mean_accel_) / count_;
-        mean_gyro_ += (s.gyro - mean_gyro_) / count_;
-        seen_.push_back(s);
-        last_ = s;
-    }
-    if (count_ < init_samples_) return true;
-    ImuCheckOptions options;
-    options.samples = seen_.size();
-    const ImuCheck check = check_imu(seen_, options);
-    const std::string note = check.ok() ? std::string() : to_string(check);
-    if (hopeless(check.status)) reset();
-    note_ = note;
-    if (hopeless(check.status)) return false;
+    const ImuStart::Progress progress = start_.add(samples);
+    if (progress != ImuStart::Progress::kReady) return progress != ImuStart::Progress::kFault;
     x = NavState{};
     x.extrinsic_rot = extrinsic_.R;
     x.extrinsic_pos = extrinsic_.t;
-    x.gyro_bias = mean_gyro_;
-    x.gravity = -kGravityLength * mean_accel_.normalized();
+    x.gyro_bias = start_.mean_gyro();
+    x.gravity = -kGravityLength * start_.mean_accel().normalized();
     P = initial_covariance();
-    accel_scale_ = kGravity / mean_accel_.norm();
+    stepper_.start(samples.back(), kGravity / start_.mean_accel().norm());
     initialised_ = true;
-    seen_.clear();
     return true;
-}
-
-ImuInput ImuProcessor::mean(const ImuSample& a, const ImuSample& b) const {
-    return {0.5 * (a.gyro + b.gyro), 0.5 * accel_scale_ * (a.accel + b.accel)};
-}
-
-void ImuProcessor::add_knot(double offset, const NavState& x, const ImuInput& u) {
-    MotionKnot k;
-    k.offset = offset;
-    k.rot = x.rot;
-    k.pos = x.pos;
-    k.vel = x.vel;
-    k.gyro = u.gyro - x.gyro_bias;
-    k.accel = x.rot * (u.accel - x.accel_bias) + x.gravity;
-    knots_.push_back(k);
 }
 
 const std::vector<MotionKnot>& ImuProcessor::propagate(const MeasureGroup& group,
                                                        double noise_scale, NavState& x,
                                                        Mat23x23& P) {
     const Mat12 Q = noise_scale * Q_;
-    ImuInput u = mean(last_, last_);
+    const std::vector<ImuStep>& steps = stepper_.cut(group);
     knots_.clear();
-    add_knot(0.0, x, u);
-    for (const ImuSample& sample : group.imu) {
-        const ImuSample head = last_;
-        last_ = sample;
-        if (has_last_end_ && sample.stamp < last_end_) continue;
-        u = mean(head, sample);
-        interval_sum_ += seconds_between(sample.stamp, head.stamp);
-        ++intervals_;
-        const bool straddles = has_last_end_ && head.stamp < last_end_;
-        const double dt = seconds_between(sample.stamp, straddles ? last_end_ : head.stamp);
-        d2lio::propagate(x, P, u, dt, Q, exact_);
-        add_knot(seconds_between(sample.stamp, group.begin), x, u);
+    knots_.push_back(motion_knot(0.0, x, ImuInput{}));
+    for (std::size_t i = 0; i < steps.size(); ++i) {
+        d2lio::propagate(x, P, steps[i], steps[i].dt, Q, exact_);
+        // The last step has no sample at its end: points there extrapolate the one before.
+        if (i + 1 < steps.size()) knots_.push_back(motion_knot(steps[i].offset, x, steps[i]));
     }
-    // Samples end at or before the scan does: hold the last input to its end.
-    const Stamp from = has_last_end_ ? std::max(last_.stamp, last_end_) : last_.stamp;
-    d2lio::propagate(x, P, u, seconds_between(group.end, from), Q, exact_);
-    last_end_ = group.end;
-    has_last_end_ = true;
     return knots_;
 }
 

@@ -2,11 +2,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "scan_matcher.hpp"
 
-#include <tbb/blocked_range.h>
-#include <tbb/parallel_for.h>
-
 #include <Eigen/Geometry>
-#include <chrono>
 #include <limits>
 
 #include "d2lio/geometry/so3.hpp"
@@ -17,13 +13,6 @@ namespace {
 constexpr int kNeighbours = 5;
 /// Far neighbours are of no use to the match, but the map's insertion rule looks at them too.
 constexpr float kUnbounded = std::numeric_limits<float>::infinity();
-constexpr std::size_t kGrain = 128;  ///< points per task
-
-using Clock = std::chrono::steady_clock;
-
-double ms_since(Clock::time_point start) {
-    return std::chrono::duration<double, std::milli>(Clock::now() - start).count();
-}
 
 }  // namespace
 
@@ -31,8 +20,7 @@ ScanMatcher::ScanMatcher(Adapter& adapter, bool extrinsic_est, double variance, 
     : adapter_(adapter),
       extrinsic_est_(extrinsic_est),
       variance_(variance),
-      threads_(threads),
-      arena_(threads) {}
+      loop_(threads) {}
 
 void ScanMatcher::begin(const std::vector<Eigen::Vector3f>& points, const IkdTree& tree) {
     points_ = &points;
@@ -42,21 +30,6 @@ void ScanMatcher::begin(const std::vector<Eigen::Vector3f>& points, const IkdTre
     verdicts_.assign(points.size(), Verdict::kFewNeighbours);
     in_map_.resize(points.size());
     search_ms_ = 0.0;
-}
-
-/// Every point writes only its own entries, so the result does not depend on the thread count.
-template <typename F>
-void ScanMatcher::for_each_point(const F& f) {
-    const std::size_t n = points_->size();
-    if (threads_ == 1) {
-        for (std::size_t i = 0; i < n; ++i) f(i);
-        return;
-    }
-    arena_.execute([&] {
-        tbb::parallel_for(tbb::blocked_range<std::size_t>(0, n, kGrain), [&f](const auto& range) {
-            for (std::size_t i = range.begin(); i != range.end(); ++i) f(i);
-        });
-    });
 }
 
 void ScanMatcher::match(std::size_t i, const NavState& x, bool search) {
@@ -111,9 +84,9 @@ void ScanMatcher::append_prior(const NavState& x, Linearisation& out) {
 }
 
 bool ScanMatcher::measure(const NavState& x, bool search, Linearisation& out) {
-    const auto start = Clock::now();
-    for_each_point([&](std::size_t i) { match(i, x, search); });
-    search_ms_ += ms_since(start);
+    StopWatch watch;
+    loop_(points_->size(), [&](std::size_t i) { match(i, x, search); });
+    search_ms_ += watch.lap();
     constexpr Eigen::Index kPriorRows = 6;
     out.reserve(static_cast<Eigen::Index>(points_->size()) + kPriorRows);
     out.rows = 0;

@@ -2,11 +2,11 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
-#include <tbb/task_arena.h>
-
 #include <vector>
 
 #include "d2lio/fastlio/adapter.hpp"
+#include "d2lio/host/point_loop.hpp"
+#include "d2lio/host/stop_watch.hpp"
 #include "d2lio/map/ikd_tree.hpp"
 #include "ieskf.hpp"
 
@@ -31,14 +31,11 @@ class ScanMatcher {
     void match(std::size_t i, const NavState& x, bool search);
     void fill_row(const NavState& x, std::size_t i, Linearisation& out, Eigen::Index row) const;
     void append_prior(const NavState& x, Linearisation& out);
-    template <typename F>
-    void for_each_point(const F& f);
 
     Adapter& adapter_;
     bool extrinsic_est_;
     double variance_;
-    int threads_;
-    tbb::task_arena arena_;
+    PointLoop loop_;
     const std::vector<Eigen::Vector3f>* points_ = nullptr;
     const IkdTree* tree_ = nullptr;
     std::vector<Neighbours> neighbours_;

@@ -6,6 +6,8 @@
 #include <cstdint>
 #include <memory>
 
+#include "d2lio/plugin/plugin.hpp"
+
 /// The only surface a FAST-LIO2 host or a patched upstream touches. C++14, plain pointers only: the
 /// two sides may be built with different standards and Eigen alignments. Matrices are column-major,
 /// rotations 3x3 R_map_imu, lengths in m, angles in rad.
@@ -13,26 +15,7 @@
 /// Per scan: begin_scan; in each iteration accept for every point (any thread, any order), then
 /// condition on the stacked rows; end_scan. Nothing throws or exits but for lack of memory.
 namespace d2lio {
-
-struct ScanDiagnostics;
-
 namespace fastlio {
-
-/// What became of one scan point; every value but kAccepted is a reason for rejection.
-enum class Verdict : std::uint8_t {
-    kAccepted,
-    kFewNeighbours,
-    kFarNeighbours,
-    kThreshold,
-    kSingularPlane,
-    kPlaneFit,
-    kResidual,
-};
-
-struct PoseView {
-    const double* rotation;  ///< 9 numbers
-    const double* position;  ///< 3 numbers
-};
 
 struct ScanInput {
     PoseView previous;         ///< posterior of the last scan
@@ -79,40 +62,10 @@ struct PriorBlock {
     int count;
 };
 
-enum class Status : std::uint8_t {
-    kOk,
-    kBadInput,  ///< NaN, infinity or a bad index: this scan runs on the host's own gates, no prior
-    kNoScan,    ///< called outside begin_scan .. end_scan
-    kSingular,  ///< a covariance could not be corrected and was left as it was
-};
-
-struct ParamDoc {
-    const char *key, *type, *default_value, *range, *unit, *doc;
-};
-
-class Adapter {
+class Adapter : public Plugin {
   public:
     Adapter();
     ~Adapter();
-    Adapter(const Adapter&) = delete;
-    Adapter& operator=(const Adapter&) = delete;
-
-    /// Sets one parameter before the first scan. False for an unknown key or a bad value: see
-    /// error().
-    bool set(const char* key, const char* value);
-    /// Message of the last refused set(): key, value, allowed range. Empty if none.
-    const char* error() const;
-    std::size_t param_count() const;
-    ParamDoc param(std::size_t i) const;  ///< null strings past the end
-    /// Voxel size of the host's map (m, > 0), used where rejection.epsilon_0 is auto.
-    bool set_map_voxel(double size);
-    /// Whether the parameters fit together; if not, see error().
-    bool check();
-
-    /// True when a rejection mode other than off is set: accept replaces the host's own test.
-    bool rejects() const;
-    /// True when a degeneracy method other than none is set: condition may change or add rows.
-    bool has_prior() const;
 
     Status begin_scan(const ScanInput& input);
     /// Decides on one point; on kAccepted fills `out`. A rejected point stays out until `fresh`.
@@ -124,15 +77,6 @@ class Adapter {
     /// @param covariance posterior, corrected in place so that it does not claim the prior's
     /// information (degeneracy.inflate_only); may be null.
     Status end_scan(const PoseView& posterior, bool converged, double* covariance, int size);
-    /// Forgets everything learnt from scans; parameters stay.
-    void reset();
-
-    /// Diagnostics of the last ended scan, by column.
-    std::size_t diagnostics_size() const;
-    const char* diagnostics_name(std::size_t i) const;  ///< null past the end
-    double diagnostics_value(std::size_t i) const;
-    /// The same as a struct, for hosts built together with this library.
-    const ScanDiagnostics& diagnostics() const;
 
   private:
     struct Impl;

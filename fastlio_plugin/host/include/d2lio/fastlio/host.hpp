@@ -7,17 +7,10 @@
 #include <vector>
 
 #include "d2lio/fastlio/config.hpp"
-#include "d2lio/fastlio/result.hpp"
+#include "d2lio/host/result.hpp"
 #include "d2lio/types.hpp"
 
 namespace d2lio::fastlio {
-
-/// Everything the host refused or lost, by reason.
-struct HostCounts {
-    SyncCounts sync;
-    FilterCounts points;
-    std::size_t resets = 0;  ///< epochs begun for an IMU gap beyond the bound
-};
 
 /// LiDAR-inertial odometry that behaves like FAST-LIO2: iterated Kalman filter, point-to-plane on
 /// an ikd-tree. Feed samples and scans in any interleaving, call step() until it has nothing more.
@@ -53,5 +46,8 @@ class Host {
     class Impl;
     std::unique_ptr<Impl> impl_;
 };
+
+/// Pose covariance of a 23-state filter in ROS order: position, then rotation about the map's axes.
+Eigen::Matrix<double, 6, 6> pose_covariance(const NavState& x, const Mat23x23& P);
 
 }  // namespace d2lio::fastlio

@@ -10,17 +10,18 @@
 #include "d2lio/diagnostics/scan_diagnostics.hpp"
 #include "d2lio/geometry/state.hpp"
 
-namespace d2lio::fastlio {
+namespace d2lio {
 
 /// What the host did with a scan.
 enum class ScanStatus {
-    kOk,                ///< filter updated
+    kOk,                ///< estimate updated
     kDropped,           ///< first scan, as FAST-LIO2
     kInitialising,      ///< gravity and gyroscope bias are being averaged
     kMapInitialised,    ///< this scan became the map
     kTooFewPoints,      ///< pose is the prediction
     kNoCorrespondence,  ///< all points rejected: pose is the prediction, covariance has grown
     kNumericalFailure,  ///< the update was not finite and was refused: pose is the prediction
+    kSkipped,           ///< too soon after the last one (mapping interval): no pose
     kImuFault,          ///< readings that no start can be made from
     kReset,  ///< stamps jumped back, a gap beyond its bound, or a filter beyond repair: new epoch
 };
@@ -52,7 +53,7 @@ struct ScanResult {
     std::vector<std::pair<std::string, double>> columns() const;
 };
 
-/// Pose covariance of a 23-state filter in ROS order: position, then rotation about the map's axes.
-Eigen::Matrix<double, 6, 6> pose_covariance(const NavState& x, const Mat23x23& P);
+/// Adds one line to the result's message.
+void say(ScanResult& result, const std::string& text);
 
-}  // namespace d2lio::fastlio
+}  // namespace d2lio

@@ -1,8 +1,8 @@
 // SPDX-FileCopyrightText: 2026 D2-LIO contributors
 // SPDX-License-Identifier: BSD-3-Clause
-#include "d2lio/fastlio/result.hpp"
+#include "d2lio/host/result.hpp"
 
-namespace d2lio::fastlio {
+namespace d2lio {
 
 const char* to_string(ScanStatus status) {
     switch (status) {
@@ -20,12 +20,18 @@ const char* to_string(ScanStatus status) {
             return "no_correspondence";
         case ScanStatus::kNumericalFailure:
             return "numerical_failure";
+        case ScanStatus::kSkipped:
+            return "skipped";
         case ScanStatus::kImuFault:
             return "imu_fault";
         case ScanStatus::kReset:
             break;
     }
     return "reset";
+}
+
+void say(ScanResult& r, const std::string& text) {
+    if (!text.empty()) r.message += (r.message.empty() ? "" : "; ") + text;
 }
 
 std::vector<std::pair<std::string, double>> ScanResult::columns() const {
@@ -60,11 +66,4 @@ std::vector<std::pair<std::string, double>> ScanResult::columns() const {
     return out;
 }
 
-Eigen::Matrix<double, 6, 6> pose_covariance(const NavState& x, const Mat23x23& P) {
-    // Both blocks are contiguous (position 0-2, rotation 3-5); the body tangent turns into the map.
-    Eigen::Matrix<double, 6, 6> J = Eigen::Matrix<double, 6, 6>::Identity();
-    J.bottomRightCorner<3, 3>() = x.rot;
-    return J * P.topLeftCorner<6, 6>() * J.transpose();
-}
-
-}  // namespace d2lio::fastlio
+}  // namespace d2lio

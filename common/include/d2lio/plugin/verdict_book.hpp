@@ -1,0 +1,32 @@
+// SPDX-FileCopyrightText: 2026 D2-LIO contributors
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <cstddef>
+#include <vector>
+
+#include "d2lio/diagnostics/scan_diagnostics.hpp"
+#include "d2lio/plugin/plugin.hpp"
+
+namespace d2lio {
+
+/// Verdict and threshold of every point of one scan. Threads may write different points at a time.
+class VerdictBook {
+  public:
+    void begin_scan(std::size_t points);
+    std::size_t size() const { return verdicts_.size(); }
+    Verdict& verdict(std::size_t i) { return verdicts_[i]; }
+    void set_threshold(std::size_t i, double threshold) {
+        thresholds_[i] = static_cast<float>(threshold);
+    }
+
+    CorrespondenceCounts counts() const;
+    /// Minimum, median and maximum of the thresholds used; NaN where none was finite.
+    void threshold_statistics(ScanDiagnostics& out);
+
+  private:
+    std::vector<Verdict> verdicts_;
+    std::vector<float> thresholds_;
+};
+
+}  // namespace d2lio

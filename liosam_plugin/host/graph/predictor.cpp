@@ -1,0 +1,139 @@
+// SPDX-FileCopyrightText: 2026 D2-LIO contributors
+// SPDX-License-Identifier: BSD-3-Clause
+#include "predictor.hpp"
+
+#include <Eigen/Geometry>
+#include <algorithm>
+
+#include "d2lio/geometry/so3.hpp"
+
+namespace d2lio::liosam {
+namespace {
+
+using I = StateIndex;
+
+/// A sensor at rest: spreads of its readings below these (vibration of an idling vehicle passes).
+constexpr double kStillGyro = 0.02;  ///< rad/s
+constexpr double kStillAccel = 0.3;  ///< m/s^2
+/// Gyroscope bias of a sensor at rest is no more than this, rad/s; a larger mean is a turn.
+constexpr double kMostBias = 0.05;
+constexpr double kShortestStep = 1e-6;  ///< s
+constexpr double kBeforeScan = -1e-9;   ///< s: points at the scan's begin are moved as well
+
+constexpr double kStandardGravity = 9.80665;  ///< m/s^2 per g
+/// Of the start, relative to the map that begins there.
+constexpr double kStartSpeed = 1.0;        ///< m/s
+constexpr double kStartGravity = 1e-3;     ///< rad, of the direction between two scans
+constexpr double kNoWeight = 1e-12;        ///< keeps a covariance definite, rad^2 and m^2
+
+/// R_map_imu with the given up direction (IMU frame) and no yaw.
+Mat3 levelled(const Vec3& up) {
+    const Mat3 R = Eigen::Quaterniond::FromTwoVectors(up, Vec3::UnitZ()).toRotationMatrix();
+    const double yaw = std::atan2(R(1, 0), R(0, 0));
+    return Eigen::AngleAxisd(-yaw, Vec3::UnitZ()) * R;
+}
+
+Mat3 rotation_of(const ImuSample& s) {
+    return Eigen::Quaterniond(s.orientation).normalized().toRotationMatrix();
+}
+
+}  // namespace
+
+Predictor::Predictor(const HostConfig& config)
+    : config_(config), extrinsic_(config.intake.extrinsic()), start_(config.intake.init_samples) {}
+
+void Predictor::reset() {
+    initialised_ = false;
+    start_.reset();
+    stepper_.reset();
+    steps_.clear();
+}
+
+bool Predictor::initialise(const std::vector<ImuSample>& samples) {
+    const ImuStart::Progress progress = start_.add(samples);
+    if (progress != ImuStart::Progress::kReady) return progress != ImuStart::Progress::kFault;
+    const ImuSample& newest = samples.back();
+    stepper_.start(newest, start_.in_g() ? kStandardGravity : 1.0);
+    x_ = NavState{};
+    x_.extrinsic_rot = extrinsic_.R;
+    x_.extrinsic_pos = extrinsic_.t;
+    const std::optional<Mat3> given = orientation();
+    x_.rot = levelled(given ? Vec3(given->row(2)) : start_.mean_accel().normalized());
+    x_.gravity = Vec3(0.0, 0.0, -config_.imu.gravity);
+    const bool still = start_.gyro_spread() < kStillGyro && start_.accel_spread() < kStillAccel &&
+                       start_.mean_gyro().norm() < kMostBias;
+    if (still) x_.gyro_bias = start_.mean_gyro();
+    P_.setZero();
+    P_.block<3, 3>(I::kVel, I::kVel).diagonal().setConstant(kStartSpeed * kStartSpeed);
+    steps_.clear();
+    initialised_ = true;
+    return true;
+}
+
+std::optional<Mat3> Predictor::orientation() const {
+    const ImuSample& s = stepper_.newest();
+    if (!config_.use_orientation || !s.has_orientation()) return std::nullopt;
+    return rotation_of(s);
+}
+
+/// Densities as covariances per step, which enter propagate() as dt^2 Q.
+Mat12 Predictor::noise_over(double dt, double scale) const {
+    const ImuGraphOptions& n = config_.imu;
+    const double per_step = scale / std::max(dt, kShortestStep);
+    const auto variance = [per_step](double density) { return density * density * per_step; };
+    ProcessNoise q;
+    q.gyro = variance(n.gyro_noise);
+    q.accel = variance(n.accel_noise);
+    q.gyro_bias = variance(n.gyro_bias_walk);
+    q.accel_bias = variance(n.accel_bias_walk);
+    return q.matrix();
+}
+
+void Predictor::advance(const MeasureGroup& group, double noise_scale) {
+    const std::vector<ImuStep>& steps = stepper_.cut(group);
+    const double first = steps.front().offset - steps.front().dt;
+    knots_.clear();
+    knots_.push_back(motion_knot(std::min(first, kBeforeScan), x_, ImuInput{}));
+    for (const ImuStep& s : steps) {
+        if (!(s.dt > 0.0)) continue;
+        propagate(x_, P_, s, s.dt, noise_over(s.dt, noise_scale), true);
+        knots_.push_back(motion_knot(s.offset, x_, s));
+        steps_.push_back(s);
+    }
+}
+
+/// The graph's pose may differ from the matched one (it trusts that loosely); what it knows of
+/// velocity and gravity is used relative to its own attitude: v_body = R^T v, g_body = R^T g.
+void Predictor::correct(const Pose& T_map_imu, const GraphState& graph) {
+    using G = GraphIndex;
+    const Mat3 to_body = graph.T_map_imu.R.transpose();
+    const Vec3 v_body = to_body * graph.vel;
+    x_.pos = T_map_imu.t;
+    x_.rot = T_map_imu.R;
+    x_.vel = T_map_imu.R * v_body;
+    x_.gravity = T_map_imu.R * to_body * Vec3(0.0, 0.0, -config_.imu.gravity);
+    x_.gyro_bias = graph.gyro_bias;
+    x_.accel_bias = graph.accel_bias;
+
+    // Error of (velocity in map axes, biases) from the graph's joint covariance.
+    Eigen::Matrix<double, 9, G::kSize> J = Eigen::Matrix<double, 9, G::kSize>::Zero();
+    J.block<3, 3>(0, G::kRot) = T_map_imu.R * hat(v_body);
+    J.block<3, 3>(0, G::kVel) = T_map_imu.R * to_body;
+    J.block<3, 3>(3, G::kGyroBias).setIdentity();
+    J.block<3, 3>(6, G::kAccelBias).setIdentity();
+    const Eigen::Matrix<double, 9, 9> C = J * graph.covariance * J.transpose();
+    P_.setZero();
+    P_.block<9, 9>(I::kVel, I::kVel) = C;  // velocity and both biases lie side by side
+    P_.block<2, 2>(I::kGravity, I::kGravity).diagonal().setConstant(kStartGravity * kStartGravity);
+    steps_.clear();
+}
+
+Mat6 Predictor::covariance() const {
+    Mat6 C;
+    C << P_.block<3, 3>(I::kRot, I::kRot), P_.block<3, 3>(I::kRot, I::kPos),
+        P_.block<3, 3>(I::kPos, I::kRot), P_.block<3, 3>(I::kPos, I::kPos);
+    C.diagonal().array() += kNoWeight;
+    return C;
+}
+
+}  // namespace d2lio::liosam

@@ -1,0 +1,59 @@
+// SPDX-FileCopyrightText: 2026 D2-LIO contributors
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <optional>
+#include <vector>
+
+#include "config.hpp"
+#include "d2lio/host/imu_intake.hpp"
+#include "imu_graph.hpp"
+
+namespace d2lio::liosam {
+
+/// Forward propagation from the last corrected state to the end of a scan: the initial guess, its
+/// covariance relative to the last estimate, and the motion for de-skewing.
+class Predictor {
+  public:
+    explicit Predictor(const HostConfig& config);
+
+    bool initialised() const { return initialised_; }
+    /// Averages one group's samples; once there are enough, sets the state to start from: at rest,
+    /// gravity from the mean acceleration or from the IMU's own orientation.
+    /// @returns false when no start can be made from them; averaging begins anew.
+    bool initialise(const std::vector<ImuSample>& samples);
+    /// Moves the state to the group's end. @param noise_scale of the process noise, >= 1.
+    void advance(const MeasureGroup& group, double noise_scale);
+    /// Takes over an estimate at the present time: pose of the scan matching, everything else from
+    /// the graph, turned into the map as the matching sees it. Starts a new horizon.
+    void correct(const Pose& T_map_imu, const GraphState& graph);
+
+    const NavState& state() const { return x_; }
+    /// 6x6 of the pose relative to the last estimate: rotation (right, body), position (map).
+    Mat6 covariance() const;
+    bool is_finite() const { return x_.is_finite() && P_.allFinite(); }
+    /// Knots of the last advance() for de-skewing, offsets from the scan's begin.
+    const std::vector<MotionKnot>& knots() const { return knots_; }
+    /// Inputs since the last correct(), for the graph.
+    const std::vector<ImuStep>& steps() const { return steps_; }
+    double mean_period() const { return stepper_.mean_period(); }
+    const std::string& note() const { return start_.note(); }
+    /// R_world_imu of a 9-axis sensor, newest sample; nothing where there is none or it is not used.
+    std::optional<Mat3> orientation() const;
+    void reset();
+
+  private:
+    Mat12 noise_over(double dt, double scale) const;
+
+    const HostConfig& config_;
+    Pose extrinsic_;
+    bool initialised_ = false;
+    ImuStart start_;
+    ImuStepper stepper_;
+    NavState x_;
+    Mat23x23 P_ = Mat23x23::Zero();
+    std::vector<MotionKnot> knots_;
+    std::vector<ImuStep> steps_;
+};
+
+}  // namespace d2lio::liosam

@@ -1,0 +1,168 @@
+// SPDX-FileCopyrightText: 2026 D2-LIO contributors
+// SPDX-License-Identifier: BSD-3-Clause
+#include "scan_to_map.hpp"
+
+#include <Eigen/Cholesky>
+#include <Eigen/Eigenvalues>
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include "d2lio/geometry/so3.hpp"
+#include "d2lio/host/stop_watch.hpp"
+#include "line_fit.hpp"
+#include "d2lio/geometry/plane.hpp"
+
+namespace d2lio::liosam {
+namespace {
+
+constexpr int kNeighbours = 5;
+constexpr float kGate = 1.0F;           ///< m^2, farthest neighbour LIO-SAM looks at
+constexpr float kPlaneDistance = 0.2F;  ///< m, of every neighbour from the plane
+constexpr double kWeightSlope = 0.9;    ///< of LIO-SAM's s
+constexpr float kInfinity = std::numeric_limits<float>::infinity();
+
+constexpr double kDegree = 57.29577951308232;
+constexpr double kCentimetre = 100.0;
+
+}  // namespace
+
+ScanToMap::ScanToMap(Adapter& adapter, const MatchOptions& options, int threads)
+    : adapter_(adapter), options_(options), loop_(threads) {}
+
+/// The weight a correspondence gets from its distance alone; LIO-SAM's s or the square root of the
+/// Cauchy kernel's weight (rows are multiplied by it, so the cost sees its square).
+static double weight_of(const MatchOptions& o, Feature feature, double distance, double range) {
+    const double d = std::abs(distance);
+    if (o.kernel_scale > 0.0) return 1.0 / std::sqrt(1.0 + std::pow(d / o.kernel_scale, 2));
+    if (feature == Feature::kCorner) return 1.0 - kWeightSlope * d;
+    return 1.0 - kWeightSlope * d / std::sqrt(range);
+}
+
+ScanToMap::Row ScanToMap::match(Feature feature, std::size_t index, const Eigen::Vector3f& p_imu,
+                                const IkdTree& map, const Pose& T) {
+    Row row{Vec6::Zero(), 0.0, false};
+    const Vec3 p = p_imu.cast<double>();
+    const Eigen::Vector3f q = (T * p).cast<float>();
+    Neighbours near;
+    map.knn(q, kNeighbours, bounded_search_ ? kGate : kInfinity, near);
+
+    float sq[kNeighbours];
+    for (int i = 0; i < kNeighbours; ++i) sq[i] = i < near.count ? near[i].sq_dist : kInfinity;
+    const bool cut_off = bounded_search_ && map.size() >= kNeighbours;  // the others are beyond
+    const double range = p.norm();
+    const Candidate candidate{feature, index, range, sq, 1, cut_off ? kNeighbours : near.count};
+    if (!(adapter_.gate(candidate) < kGate)) return row;
+
+    Match m{Eigen::Vector3f::Zero(), 0.0};
+    const float* const xyz = &near.items[0].x;
+    constexpr int kStride = sizeof(Neighbour) / sizeof(float);
+    if (feature == Feature::kCorner) {
+        Line line;
+        if (!fit_line(xyz, kStride, kNeighbours, line)) return row;
+        m.normal = line.away_from(q);
+        m.distance = static_cast<double>(m.normal.dot(q - line.point));
+    } else {
+        Plane plane;
+        PlaneFitOptions fit;
+        fit.max_distance = kPlaneDistance;
+        switch (fit_plane(xyz, kStride, kNeighbours, fit, plane)) {
+            case PlaneStatus::kSingular:
+                adapter_.mark_singular(feature, index);
+                return row;
+            case PlaneStatus::kRough:
+                return row;
+            case PlaneStatus::kOk:
+                break;
+        }
+        m.normal = plane.normal;
+        m.distance = static_cast<double>(plane.signed_distance(q));
+    }
+    const double weight =
+        adapter_.weigh(feature, index, weight_of(options_, feature, m.distance, range));
+    if (!(weight > 0.0)) return row;
+    const Vec3 n = m.normal.cast<double>();
+    row.jacobian << weight * p.cross(T.R.transpose() * n), weight * n;
+    row.residual = weight * m.distance;
+    row.used = std::isfinite(row.residual) && row.jacobian.allFinite();
+    return row;
+}
+
+/// Rows are found in parallel and summed in order, so the sum does not depend on the threads.
+int ScanToMap::linearise(const MatchInput& in, const Pose& T, Mat6& AtA, Vec6& Atb) {
+    const std::size_t corners = in.corners.size();
+    rows_.resize(corners + in.surfaces.size());
+    loop_(rows_.size(), [&](std::size_t i) {
+        rows_[i] = i < corners
+                       ? match(Feature::kCorner, i, in.corners[i], in.corner_map, T)
+                       : match(Feature::kSurface, i - corners, in.surfaces[i - corners],
+                               in.surface_map, T);
+    });
+    AtA.setZero();
+    Atb.setZero();
+    int used = 0;
+    for (const Row& row : rows_) {
+        if (!row.used) continue;
+        AtA.selfadjointView<Eigen::Lower>().rankUpdate(row.jacobian);
+        Atb -= row.residual * row.jacobian;
+        ++used;
+    }
+    AtA.triangularView<Eigen::StrictlyUpper>() = AtA.transpose();
+    return used;
+}
+
+/// LIO-SAM's own remedy (Zhang 2016): directions of the mixed-unit A^T A with an eigenvalue below
+/// the threshold get no step. Found at the first iteration, kept for the scan.
+void ScanToMap::find_remapping(const Mat6& AtA, MatchReport& report) {
+    keep_.setIdentity();
+    if (adapter_.has_prior() || options_.eigenvalue_threshold <= 0.0) return;
+    const Eigen::SelfAdjointEigenSolver<Mat6> solver(AtA);
+    for (int i = 0; i < 6; ++i) {
+        if (solver.eigenvalues()[i] >= options_.eigenvalue_threshold) continue;
+        const Vec6 v = solver.eigenvectors().col(i);
+        keep_ -= v * v.transpose();
+        report.remapped = true;
+    }
+}
+
+/// One Gauss-Newton step. @returns false when the iterations are over.
+bool ScanToMap::step(const MatchInput& input, Pose& T, MatchReport& report) {
+    Mat6 AtA;
+    Vec6 Atb;
+    StopWatch watch;
+    const int used = linearise(input, T, AtA, Atb);
+    report.search_ms += watch.lap();
+    if (used < options_.min_rows) {
+        report.status = MatchStatus::kFewRows;
+        return false;
+    }
+    if (report.iterations == 0) find_remapping(AtA, report);
+    report.information = AtA;
+    ++report.iterations;
+    adapter_.condition_tangent({T.R.data(), T.t.data()}, options_.variance,
+                               {AtA.data(), Atb.data()});
+    report.degenerate = adapter_.degenerate() || report.remapped;
+    const Vec6 d = keep_ * AtA.ldlt().solve(Atb);
+    const Pose next{renormalise_so3(T.R * exp_so3(d.head<3>())), T.t + d.tail<3>()};
+    if (!next.R.allFinite() || !next.t.allFinite()) {
+        report.status = MatchStatus::kNumericalFailure;
+        return false;
+    }
+    T = next;
+    report.status = MatchStatus::kOk;
+    report.converged = d.head<3>().norm() * kDegree < options_.rotation_epsilon &&
+                       d.tail<3>().norm() * kCentimetre < options_.translation_epsilon;
+    return !report.converged;
+}
+
+MatchReport ScanToMap::align(const MatchInput& input, Pose& T_map_imu) {
+    MatchReport report;
+    bounded_search_ = !adapter_.rejects();
+    Pose T = T_map_imu;
+    while (report.iterations < options_.max_iterations && step(input, T, report)) {
+    }
+    if (report.status != MatchStatus::kNumericalFailure) T_map_imu = T;
+    return report;
+}
+
+}  // namespace d2lio::liosam

@@ -1,0 +1,89 @@
+// SPDX-FileCopyrightText: 2026 D2-LIO contributors
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <vector>
+
+#include "d2lio/host/point_loop.hpp"
+#include "d2lio/liosam/adapter.hpp"
+#include "d2lio/map/ikd_tree.hpp"
+#include "d2lio/types.hpp"
+
+namespace d2lio::liosam {
+
+using Mat6 = Eigen::Matrix<double, 6, 6>;
+using Vec6 = Eigen::Matrix<double, 6, 1>;
+
+struct MatchOptions {
+    int max_iterations = 30;
+    double rotation_epsilon = 0.05;      ///< deg, a smaller step ends the iterations
+    double translation_epsilon = 0.05;   ///< cm, likewise
+    int min_rows = 50;                   ///< accepted features that a step needs
+    double eigenvalue_threshold = 100.0;  ///< of A^T A, for the host's own solution remapping; 0: off
+    double variance = 1e-3;              ///< m^2, of a row of unit weight
+    /// Scale of the Cauchy kernel, m. 0: LIO-SAM's weight, which falls with the distance and rises
+    /// with the square root of the range.
+    double kernel_scale = 0.0;
+};
+
+enum class MatchStatus {
+    kOk,
+    kFewRows,           ///< fewer accepted features than a step needs: the pose stays as it was then
+    kNumericalFailure,  ///< a step was not finite: the pose is the initial guess
+};
+
+struct MatchReport {
+    MatchStatus status = MatchStatus::kFewRows;
+    int iterations = 0;
+    bool converged = false;
+    bool degenerate = false;      ///< some direction is weak, judged on the scan's own rows
+    bool remapped = false;        ///< the host's own remapping held back some direction
+    Mat6 information = Mat6::Zero();  ///< A^T A of the scan's rows at the last iterate; tangent order
+    double search_ms = 0.0;
+};
+
+/// One scan's features in the body frame and the maps they are matched with (map frame).
+struct MatchInput {
+    const std::vector<Eigen::Vector3f>& corners;
+    const std::vector<Eigen::Vector3f>& surfaces;
+    const IkdTree& corner_map;
+    const IkdTree& surface_map;
+};
+
+/// LIO-SAM's scan-to-map Gauss-Newton: point-to-line for corners, point-to-plane for surfaces, with
+/// the adapter deciding on every correspondence and conditioning the normal equations. The step is
+/// taken in the right tangent of the rotation and in map axes, so that no pitch is singular.
+class ScanToMap {
+  public:
+    ScanToMap(Adapter& adapter, const MatchOptions& options, int threads);
+
+    /// @param T_map_imu the initial guess, replaced by the estimate. Call between the adapter's
+    /// begin_scan and end_scan.
+    MatchReport align(const MatchInput& input, Pose& T_map_imu);
+
+  private:
+    struct Row {
+        Vec6 jacobian;  ///< rotation (right tangent), translation (map)
+        double residual;
+        bool used;
+    };
+    struct Match {
+        Eigen::Vector3f normal;
+        double distance;
+    };
+
+    Row match(Feature feature, std::size_t index, const Eigen::Vector3f& p, const IkdTree& map,
+              const Pose& T);
+    int linearise(const MatchInput& input, const Pose& T, Mat6& AtA, Vec6& Atb);
+    void find_remapping(const Mat6& AtA, MatchReport& report);
+    bool step(const MatchInput& input, Pose& T, MatchReport& report);
+
+    Adapter& adapter_;
+    MatchOptions options_;
+    PointLoop loop_;
+    bool bounded_search_ = true;
+    std::vector<Row> rows_;
+    Mat6 keep_ = Mat6::Identity();
+};
+
+}  // namespace d2lio::liosam
