@@ -111,7 +111,7 @@ install_gtsam() {
 
 # CMake finds it from here on; it must look anew, as an earlier one may still be in its own cache.
 use_gtsam() {
-    GTSAM_ARGUMENTS=(-UGTSAM_DIR -DD2LIO_GTSAM="$([[ -n $gtsam_from ]] && echo ON || echo OFF)")
+    GTSAM_ARGUMENTS=('-UGTSAM_*' -DD2LIO_GTSAM="$([[ -n $gtsam_from ]] && echo ON || echo OFF)")
     [[ $gtsam_from == cache ]] || return 0
     export CMAKE_PREFIX_PATH="$gtsam_prefix${CMAKE_PREFIX_PATH:+:$CMAKE_PREFIX_PATH}"
 }
