@@ -111,6 +111,7 @@ HOSTS: dict[str, Callable[[], Any]] = {
 }
 NEED_GTSAM = ("liosam", "d2lio")
 TITLES = {"fastlio": "FAST-LIO2 host", "liosam": "LIO-SAM host", "d2lio": "D²-LIO"}
+SHORT_TITLES = {"fastlio": "FAST-LIO2", "liosam": "LIO-SAM", "d2lio": "D²-LIO"}
 
 
 def load_host(name: str) -> Any:

@@ -19,7 +19,7 @@ RunStatus = Literal["complete", "diverged", "failed", "interrupted"]
 
 
 class StageTime(BaseModel):
-    """Time per scan of one stage, ms."""
+    """Time of one stage per scan that gave a pose, ms."""
 
     mean: float
     median: float

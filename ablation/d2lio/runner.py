@@ -86,12 +86,13 @@ class _Tally:
         row = result.diagnostics
         self.offered += int(row.get("offered", 0))
         self.accepted += int(row.get("accepted", 0))
-        for key, value in row.items():
-            if key.startswith("time_") and key.endswith("_ms"):
-                self.times.setdefault(key[5:-3], []).append(float(value))
         if not result.has_pose:
             self.without_pose[result.status] += 1
             return False
+        # LIO-SAM skips every other scan in no time: that is no time per scan.
+        for key, value in row.items():
+            if key.startswith("time_") and key.endswith("_ms"):
+                self.times.setdefault(key[5:-3], []).append(float(value))
         self._follow(result)
         return True
 

@@ -10,24 +10,36 @@ import os
 import re
 import shutil
 import subprocess
+from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
 import pytest
-from d2lio import demo
+from built import WHY_NOT
+from d2lio import demo, hosts
 from d2lio.cli.commands_demo import _print
 from d2lio.report.diagnostics import read_diagnostics
-from d2lio.report.figures import MAX_POINTS, thin
+from d2lio.report.figures import MAX_POINTS, SHOWN, thin
+from d2lio.report.page import write_report
 
 SCENES = (
-    demo.Scene("room", "Room", 4.0),
-    demo.Scene("room", "Room <b>", 4.0, ("filter_size_map=0.4",), seed=1),
+    demo.Scene("room", "Room", 6.0),
+    demo.Scene("room", "Room <b>", 6.0, ("imu.init_samples=12",), seed=1),
 )
 VARIANTS = (
     demo.Variant("off", "none"),
     demo.Variant("point_adaptive", "paper"),
     demo.Variant("no_such_mode", "none"),
+    *(
+        ()
+        if WHY_NOT
+        else (
+            demo.Variant("off", "none", "liosam"),
+            demo.Variant("point_adaptive", "paper", "d2lio"),
+        )
+    ),
 )
+ROOM_ATE_M = {"fastlio": 0.05, "liosam": 0.15, "d2lio": 0.05}
 BROWSERS = ("chromium", "chromium-browser", "google-chrome")
 
 
@@ -40,8 +52,8 @@ def result(tmp_path_factory: pytest.TempPathFactory) -> demo.DemoResult:
 def test_a_refused_run_is_a_row_and_the_others_go_on(result: demo.DemoResult) -> None:
     with (result.out / demo.RESULTS_FILE).open() as stream:
         rows = list(csv.DictReader(stream))
-    assert [(r["scene"], r["rejection"], r["degeneracy"]) for r in rows] == [
-        (s.name, v.rejection, v.degeneracy) for s in SCENES for v in VARIANTS
+    assert [(r["scene"], r["host"], r["rejection"], r["degeneracy"]) for r in rows] == [
+        (s.name, v.host, v.rejection, v.degeneracy) for s in SCENES for v in VARIANTS
     ]
     for row in rows:
         if row["rejection"] == "no_such_mode":
@@ -49,12 +61,36 @@ def test_a_refused_run_is_a_row_and_the_others_go_on(result: demo.DemoResult) ->
             assert "rejection.mode" in row["reason"]
             assert row["ate_m"] == ""
         else:
-            assert row["status"] == "ok"
-            assert float(row["ate_m"]) < 0.05
+            assert row["status"] == "ok", row
+            assert float(row["ate_m"]) < ROOM_ATE_M[row["host"]]
             assert float(row["coverage"]) > 0.95
             assert 0.0 < float(row["accepted_share"]) <= 1.0
             assert (result.out / row["directory"] / "run.json").exists()
     assert len(result.crashed) == len(SCENES)
+
+
+def test_the_demo_shows_every_host() -> None:
+    assert {variant.host for variant in demo.VARIANTS} == set(hosts.HOSTS)
+    places = [variant.directory for variant in demo.VARIANTS]
+    labels = [variant.label for variant in demo.VARIANTS]
+    assert set(SHOWN) < set(demo.VARIANTS)
+    assert len(set(places)) == len(set(labels)) == len(demo.VARIANTS)
+    groups = [variant.group for variant in demo.VARIANTS]
+    assert len(set(groups)) == sum(a != b for a, b in pairwise(["", *groups]))  # each in one piece
+
+
+def test_without_gtsam_the_rest_is_shown_and_the_note_says_why(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setattr(hosts, "LIOSAM_MODULE", "d2lio._no_such_module")
+    variants, note = demo.runnable(demo.VARIANTS)
+    assert {variant.host for variant in variants} == {"fastlio"}
+    assert "D2LIO_GTSAM=on" in note
+    result = demo.DemoResult(tmp_path, [], SCENES, variants, note)
+    write_report(result, tmp_path / "report.html")
+    assert "D2LIO_GTSAM=on" in (tmp_path / "report.html").read_text(encoding="utf-8")
+    _print(result)
+    assert "left out: the LIO-SAM host" in capsys.readouterr().err
 
 
 def test_crash_and_divergence_show_as_such(result: demo.DemoResult, tmp_path: Path) -> None:
@@ -102,7 +138,8 @@ def test_printed_table_names_every_variant(
     printed = capsys.readouterr()
     for variant in VARIANTS:
         assert variant.rejection in printed.out
-    assert "prior: paper" in printed.out
+        assert variant.group in printed.out
+    assert "FAST-LIO2 + prior" in printed.out
     assert "ATE [m]" in printed.out
     assert "report.html" in printed.out
     assert "rejection.mode" in printed.err
@@ -123,11 +160,20 @@ def test_report_holds_all_it_needs(result: demo.DemoResult) -> None:
         titles = [figure["layout"]["title"]["text"] for figure in scene["figures"]]
         assert titles[:3] == ["Top view, aligned", "Side view, aligned", "Translation error"]
         assert any("λ_min" in title for title in titles)
+        assert all(_drawn(f) for f in scene["figures"] if "λ_min" in f["layout"]["title"]["text"])
         assert "Acceptance radius ε" in titles
-        assert scene["params"] in ("", "filter_size_map=0.4")
+        assert scene["params"] in ("", "imu.init_samples=12")
         assert "Correspondences by outcome" in titles
     links = re.findall(r'href="([^"#]+)"', markup)
     assert all((result.out / link).exists() for link in links if not link.startswith("data:"))
+
+
+def _drawn(figure: dict) -> bool:
+    """Whether every curve of the figure is a line and not only single points between gaps."""
+    return all(
+        any(a is not None and b is not None for a, b in pairwise(curve["y"]))
+        for curve in figure["data"]
+    )
 
 
 def test_report_in_a_browser(result: demo.DemoResult, tmp_path: Path) -> None:

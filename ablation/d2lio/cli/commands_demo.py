@@ -34,7 +34,7 @@ def demo(
     threads: Annotated[int, typer.Option(min=1, help="Threads of the estimator.")] = 1,
     as_json: Annotated[bool, typer.Option("--json", help="Machine-readable result.")] = False,
 ) -> None:
-    """Rerun the ablation in small: three scenes, five rejection modes, prior off and on."""
+    """Rerun the ablation in small: three scenes, three hosts, rejection modes, prior off and on."""
     from d2lio.demo import run_demo
 
     with guard():
@@ -59,6 +59,7 @@ def _emit(result: DemoResult) -> None:
     emit_json(
         json.dumps(
             {
+                "note": result.note,
                 "rows": [csv_row(row, result.out) for row in result.rows],
                 "results": str(result.out / RESULTS_FILE),
                 "report": str(result.out / REPORT_FILE),
@@ -82,15 +83,18 @@ def _print(result: DemoResult) -> None:
         table.add_column(scene.title, justify="right", no_wrap=True)
     former = ""
     for variant in result.variants:
-        if variant.degeneracy != former:
-            title = "no prior" if variant.degeneracy == "none" else f"prior: {variant.degeneracy}"
-            table.add_row(f"[dim]{title}[/]")
-            former = variant.degeneracy
+        if variant.group != former:
+            table.add_row(f"[dim]{variant.group}[/]")
+            former = variant.group
         texts = [f"{ate} {share:>4} {ms:>4}" for ate, share, ms in cells(result, variant)]
         table.add_row(f" {variant.rejection}", *texts)
     stdout().print(table)
+    if result.note:
+        note(f"left out: {result.note}")
     failed = [row for row in result.rows if row.status != "ok"]
     for row in failed:
+        if row.ate is not None:
+            continue  # the table says it
         note(f"{row.scene.name}, {row.variant.label}: {row.reason}")
     if failed:
         note(f"`-`: coverage below 95 % or ATE beyond {FAIL_PERCENT:g} % of the path")

@@ -9,18 +9,29 @@ from typing import Any
 import numpy as np
 
 from d2lio.demo import DemoResult, Row, Scene, Variant
+from d2lio.hosts import TITLES
 from d2lio.report.diagnostics import read_diagnostics, seconds_from_start
 
 MAX_POINTS = 400  # per curve
 COLOURS = {
-    "off": "#888888",
-    "none": "#d1495b",
-    "fixed": "#e58606",
-    "kiss": "#2f7ebc",
-    "point_adaptive": "#2a9d4a",
+    "fastlio": {
+        "off": "#888888",
+        "none": "#d1495b",
+        "fixed": "#e58606",
+        "kiss": "#2f7ebc",
+        "point_adaptive": "#2a9d4a",
+    },
+    "liosam": {"off": "#7b4fa3", "point_adaptive": "#c77dff"},
+    "d2lio": {"off": "#8c6d31", "point_adaptive": "#00a6b8"},
 }
+OTHER_COLOUR = "#b0508f"
 TRUTH_COLOUR = "#b8b8b8"
-SHOWN = ("off", "point_adaptive", "off + prior", "point_adaptive + prior")  # at first
+SHOWN = (  # at first: every host as it is, and what this project adds to it
+    Variant("off", "none"),
+    Variant("point_adaptive", "paper"),
+    Variant("off", "none", "liosam"),
+    Variant("point_adaptive", "paper", "d2lio"),
+)
 STAGES = ("preprocess", "deskew", "downsample", "search", "update", "map")
 OUTCOME_COLOURS = ("#2a9d4a", "#264653", "#5b8ea6", "#d1495b", "#9b5de5", "#e58606", "#e9c46a")
 STAGE_COLOURS = ("#264653", "#2f7ebc", "#7fb7d6", "#e58606", "#d1495b", "#2a9d4a")
@@ -38,21 +49,23 @@ Columns = dict[str, np.ndarray]
 
 
 def line_style(variant: Variant) -> dict[str, str]:
-    """Colour by rejection mode, dashes for the prior."""
+    """Colour by host and rejection mode, dashes for the prior."""
     return {
-        "color": COLOURS.get(variant.rejection, "#7b4fa3"),
+        "color": COLOURS.get(variant.host, {}).get(variant.rejection, OTHER_COLOUR),
         "dash": "solid" if variant.degeneracy == "none" else "dash",
     }
 
 
 def variant_buttons(result: DemoResult) -> list[dict[str, Any]]:
-    """What the page needs to draw one button per variant."""
+    """What the page needs to draw one button per variant, by host."""
     return [
         {
             "label": v.label,
+            "host": TITLES.get(v.host, v.host),
+            "text": v.rejection + ("" if v.degeneracy == "none" else " + prior"),
             "colour": line_style(v)["color"],
             "dashed": v.degeneracy != "none",
-            "shown": v.label in SHOWN,
+            "shown": v in SHOWN,
         }
         for v in result.variants
     ]
@@ -64,6 +77,12 @@ def thin(values: np.ndarray, digits: int = 5) -> list[float | None]:
     return [
         float(f"{v:.{digits}g}") if np.isfinite(v) else None for v in np.asarray(values)[::step]
     ]
+
+
+def _pale(colour: str) -> str:
+    """A colour #rrggbb, nearly transparent."""
+    channels = ", ".join(str(int(colour[i : i + 2], 16)) for i in (1, 3, 5))
+    return f"rgba({channels}, 0.18)"
 
 
 def _curve(name: str, x: np.ndarray, y: np.ndarray, row: Row | None, **extra: Any) -> Figure:
@@ -141,10 +160,18 @@ def diagnostics_of(result: DemoResult, scene: Scene) -> list[tuple[Row, Columns]
     for variant in result.variants:
         row = result.row(scene, variant)
         if row is not None and row.record is not None:
-            columns = read_diagnostics(row.directory / "diagnostics.csv")
+            columns = _processed(read_diagnostics(row.directory / "diagnostics.csv"))
             if len(columns.get("stamp_ns", ())):
                 found.append((row, columns))
     return found
+
+
+def _processed(columns: Columns) -> Columns:
+    """Without the scans that a host skips on purpose, as LIO-SAM does with every other one."""
+    if "status" not in columns:
+        return columns
+    kept = columns["status"] != "skipped"
+    return {name: values[kept] for name, values in columns.items()}
 
 
 def lambda_min(runs: list[tuple[Row, Columns]]) -> list[Figure]:
@@ -177,14 +204,14 @@ def thresholds(runs: list[tuple[Row, Columns]]) -> Figure:
             high = _curve("max", t, columns["epsilon_max"], row, fill="tonexty")
             for edge in (low, high):
                 edge["line"]["width"] = 0
-            high["fillcolor"] = "rgba(42, 157, 74, 0.18)"
+            high["fillcolor"] = _pale(high["line"]["color"])
             data += [low, high]
     return _figure("Acceptance radius ε", "time [s]", "ε [m]", data)
 
 
 def rejections(runs: list[tuple[Row, Columns]]) -> Figure:
     """Share of offered correspondences accepted and rejected, by reason."""
-    names = [row.variant.label for row, _ in runs]
+    names = _labels(runs)
     data = []
     for key, label in {"accepted": "accepted", **REASONS}.items():
         shares = [
@@ -199,7 +226,7 @@ def rejections(runs: list[tuple[Row, Columns]]) -> Figure:
 
 def timing(runs: list[tuple[Row, Columns]]) -> Figure:
     """Median time per scan by stage."""
-    names = [row.variant.label for row, _ in runs]
+    names = _labels(runs)
     data = []
     for stage in STAGES:
         medians = [
@@ -214,8 +241,13 @@ def timing(runs: list[tuple[Row, Columns]]) -> Figure:
     return _bars("Time per scan by stage", "median [ms]", data, STAGE_COLOURS)
 
 
+def _labels(runs: list[tuple[Row, Columns]]) -> list[str]:
+    return [row.variant.label for row, _ in runs]
+
+
 def _bars(title: str, x: str, data: list[Figure], colours: tuple[str, ...]) -> Figure:
     for index, bar in enumerate(data):
+        bar["by_variant"] = True  # the page shows the bars of the variants chosen
         bar["x"] = thin(np.asarray(bar["x"]))
         bar["marker"] = {"color": colours[index % len(colours)]}
     figure = _figure(title, x, "", data, barmode="stack")

@@ -30,10 +30,15 @@ def _plotly() -> str:
 
 def _table(result: DemoResult) -> str:
     head = "".join(f'<th colspan="3">{escape(s.title)}</th>' for s in result.scenes)
+    width = 1 + 3 * len(result.scenes)
     units = "<th>ATE [m]</th><th>accepted</th><th>ms/scan</th>" * len(result.scenes)
-    lines = [f"<thead><tr><th></th>{head}</tr><tr><th>variant</th>{units}</tr></thead><tbody>"]
+    lines = [f"<thead><tr><th></th>{head}</tr><tr><th>rejection</th>{units}</tr></thead><tbody>"]
     best = {scene: _best(result, scene) for scene in result.scenes}
+    former = ""
     for variant in result.variants:
+        if variant.group != former:
+            former = variant.group
+            lines.append(f'<tr class="group"><th colspan="{width}">{escape(former)}</th></tr>')
         tds = []
         for scene in result.scenes:
             row = result.row(scene, variant)
@@ -44,7 +49,7 @@ def _table(result: DemoResult) -> str:
             why = escape(row.reason, quote=True) if row is not None else ""
             tds.append(f'<td class="{kind}" title="{why}">{escape(ate)}</td>')
             tds.append(f'<td class="dim">{share}</td><td class="dim">{ms}</td>')
-        lines.append(f"<tr><th>{escape(variant.label)}</th>{''.join(tds)}</tr>")
+        lines.append(f"<tr><th>{escape(variant.rejection)}</th>{''.join(tds)}</tr>")
     return "".join(lines) + "</tbody>"
 
 
@@ -105,6 +110,7 @@ def write_report(result: DemoResult, path: Path) -> None:
         "VERSION": escape(__version__),
         "FAIL_PERCENT": f"{FAIL_PERCENT:g}",
         "TABLE": _table(result),
+        "NOTE": escape(result.note and f"Left out: {result.note}."),
         "FAILURES": _failures(result),
         "FILES": _files(result),
         "VARIANTS": _script_json(figures.variant_buttons(result)),
