@@ -2,7 +2,8 @@
 # SPDX-License-Identifier: BSD-3-Clause
 # shellcheck shell=bash
 #
-# ./d2lio bench: builds and runs every Google Benchmark binary, then the Python summary.
+# ./d2lio bench: builds and runs every Google Benchmark binary, then the Python summary and a long
+# simulated drive that shows whether memory stays bounded.
 
 cmd_bench() {
     cd -- "$ROOT" # presets are the checkout's
@@ -18,7 +19,8 @@ cmd_bench() {
     done < <(find "$BUILD/bench" -path "$results" -prune -o -type f -name 'bench_*' -perm -u+x -print0 | sort -z)
     ((${#files[@]})) || die "$E_FAILED" 'no benchmark was built'
     say "results: $results"
-    if "$VENV/bin/python" -c 'import importlib.util, sys; sys.exit(importlib.util.find_spec("d2lio.bench_summary") is None)'; then
-        exec "$VENV/bin/python" -m d2lio.bench_summary "${files[@]}"
-    fi
+    "$VENV/bin/python" -m d2lio.bench_summary "${files[@]}" || die "$E_FAILED" 'the summary failed'
+    say "driving ${D2LIO_BENCH_MINUTES:-30} simulated minutes (D2LIO_BENCH_MINUTES), about 3 minutes"
+    exec "$VENV/bin/python" -m d2lio.bench_drive --minutes "${D2LIO_BENCH_MINUTES:-30}" \
+        --out "$results/drive.json"
 }
