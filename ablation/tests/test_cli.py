@@ -13,6 +13,8 @@ from pathlib import Path
 
 import pytest
 from bags import drive, write_bag
+from built import host_params, needs_gtsam
+from d2lio import hosts
 from d2lio.cli import app
 from d2lio.jobs import d2lio_command, run_process
 from d2lio.record import RunRecord
@@ -188,6 +190,36 @@ def test_params_in_three_forms() -> None:
     rows = [line for line in page.splitlines() if line.startswith("| `")]
     assert all(row.replace("\\|", "").count("|") == 7 for row in rows)
     assert "rejection.mode" in in_process("params").stdout
+
+
+@needs_gtsam
+def test_params_of_all_hosts() -> None:
+    by_host = json.loads(in_process("params", "--host", "all", "--json").stdout)
+    assert list(by_host) == ["fastlio", "liosam", "d2lio"]
+    page = in_process("params", "--host", "all", "--markdown").stdout
+    keys = {entry["key"] for entries in by_host.values() for entry in entries}
+    assert all(f"| `{key}` |" in page for key in keys)
+    assert "host d2lio" in in_process("params", "--host", "d2lio").stdout
+
+
+@pytest.mark.parametrize("host", host_params(("liosam", "d2lio")))
+def test_run_with_another_host(sequence: Path, tmp_path: Path, host: str) -> None:
+    out = tmp_path / "o"
+    done = in_process("run", sequence, "--host", host, "--max-scans", 12, "--out", out, "--json")
+    assert done.returncode == DONE, done.stderr
+    record = RunRecord.load(out)
+    assert record.host == host
+    assert record.params["N_SCAN"] == "16"
+    assert record.scans.processed >= 4
+
+
+def test_a_host_that_is_not_built_is_one_line(
+    sequence: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(hosts, "LIOSAM_MODULE", "d2lio._no_such_module")
+    done = in_process("run", sequence, "--host", "liosam", "--out", tmp_path / "o")
+    assert "without GTSAM" in one_line_error(done, DATA)
+    assert "without GTSAM" in one_line_error(in_process("params", "--host", "all"), DATA)
 
 
 def test_help_and_version_name_exit_codes() -> None:
