@@ -17,10 +17,17 @@ STAGES = ("preprocess", "deskew", "downsample", "search", "update", "map", "tota
 HOSTS = {
     "BM_ScanOff": "FAST-LIO2, off",
     "BM_ScanPointAdaptivePaper": "FAST-LIO2, adaptive, prior",
-    "BM_LioSamScan": "LIO-SAM, off",
-    "BM_D2LioScan": "D²-LIO",
+}
+STREET_HOSTS = {
+    "BM_ScanLioSam": "LIO-SAM",
+    "BM_ScanD2LioOff": "D²-LIO, off, no prior",
+    "BM_ScanD2Lio": "D²-LIO",
 }
 COST_GOAL_PERCENT = 2.0
+PLUGIN_COSTS = (
+    ("FAST-LIO2", "BM_PluginCost", f"; goal <= {COST_GOAL_PERCENT:g} %"),
+    ("D²-LIO", "BM_LioSamPluginCost", ""),
+)
 SCAN_PERIOD_MS = 100.0  # of a VLP-16 at 10 Hz
 PERIOD_SHARE = 0.5  # of the scan period that D2-LIO may take on one core
 WIDTH = 110  # columns where the output is no terminal
@@ -43,11 +50,10 @@ def _named(entries: list[Entry], prefix: str) -> list[Entry]:
 
 def stage_table(entries: list[Entry]) -> Table:
     """Time per scan by stage, ms: one row per host setting and thread count."""
-    table = Table(title="time per scan, ms (28 800 raw points)")
+    table = Table(title="a room: time per scan, ms (28 800 raw points)")
     table.add_column("host")
-    table.add_column("threads", justify="right")
-    for stage in STAGES:
-        table.add_column(stage, justify="right")
+    for column in ("threads", *STAGES):
+        table.add_column(column, justify="right")
     for prefix, label in HOSTS.items():
         for entry in _named(entries, prefix):
             threads = entry["name"].split("/")[1]
@@ -55,29 +61,58 @@ def stage_table(entries: list[Entry]) -> Table:
     return table
 
 
-def period_share(entries: list[Entry]) -> str:
-    """D²-LIO's time per scan against half the scan period, on one thread; median of the runs."""
-    found = [e for e in _named(entries, "BM_D2LioScan") if e["name"].split("/")[1] == "1"]
-    if not found:
-        return "D²-LIO per VLP-16 scan: not measured (built without GTSAM)"
-    ms = median(e["total_ms"] for e in found)
+def street_table(entries: list[Entry]) -> Table:
+    """Time per scan of a street drive, one thread, ms: one row per host and speed."""
+    table = Table(title="a street, one thread: time per scan, ms")
+    table.add_column("host")
+    for column in ("m/s", *STAGES[:-1], "mean", "p95", "CPU"):
+        table.add_column(column, justify="right")
+    for prefix, label in STREET_HOSTS.items():
+        for entry in _named(entries, prefix):
+            if entry.get("error_occurred"):
+                table.add_row(label, _speed(entry), str(entry.get("error_message", "failed")))
+                continue
+            keys = [f"{stage}_ms" for stage in STAGES[:-1]] + ["mean_ms", "p95_ms", "cpu_ms"]
+            table.add_row(label, _speed(entry), *(f"{entry[key]:.2f}" for key in keys))
+    return table
+
+
+def _speed(entry: Entry) -> str:
+    """The benchmark's argument, m/s, as in BM_X/speed:8/iterations:60/manual_time."""
+    return entry["name"].split("/")[1].removeprefix("speed:")
+
+
+def period_share(entries: list[Entry]) -> list[str]:
+    """D²-LIO's mean time per scan against half the scan period, one line a speed."""
+    lines = []
     goal = PERIOD_SHARE * SCAN_PERIOD_MS
-    return (
-        f"D²-LIO per VLP-16 scan: {'PASS' if ms < goal else 'FAIL'}: {ms:.1f} ms on one core is "
-        f"{ms / goal:.2f} of half the scan period ({goal:.0f} ms; goal < 1)"
-    )
+    for entry in _named(entries, "BM_ScanD2Lio"):
+        head = f"D²-LIO per VLP-16 scan at {_speed(entry)} m/s: "
+        if entry.get("error_occurred"):
+            lines.append(f"{head}FAIL: {entry.get('error_message', 'failed')}")
+            continue
+        ms, cpu = entry["mean_ms"], entry["cpu_ms"]
+        lines.append(
+            f"{head}{'PASS' if ms < goal else 'FAIL'}: {ms:.1f} ms on one core ({cpu:.1f} ms of "
+            f"CPU time) is {ms / goal:.2f} of half the scan period ({goal:.0f} ms)"
+        )
+    return lines or ["D²-LIO per VLP-16 scan: not measured (built without GTSAM)"]
 
 
-def plugin_cost(entries: list[Entry]) -> str:
+def plugin_cost(entries: list[Entry]) -> list[str]:
     """Cost of gate and prior as a share of search and update: median over the repetitions."""
-    shares = [e["share_percent"] for e in _named(entries, "BM_PluginCost")]
-    if not shares:
-        return "gate and prior: not measured"
-    spread = f"{min(shares):.1f} … {max(shares):.1f}"
-    return (
-        f"gate and prior cost {median(shares):.1f} % of search and update "
-        f"(median of {len(shares)}, {spread}; goal <= {COST_GOAL_PERCENT:g} %)"
-    )
+    lines = []
+    for host, benchmark, goal in PLUGIN_COSTS:
+        shares = [e["share_percent"] for e in _named(entries, benchmark) if "share_percent" in e]
+        if not shares:
+            lines.append(f"{host}: gate and prior: not measured")
+            continue
+        spread = f"{min(shares):.1f} … {max(shares):.1f}"
+        lines.append(
+            f"{host}: gate and prior cost {median(shares):.1f} % of search and update "
+            f"(median of {len(shares)}, {spread}{goal})"
+        )
+    return lines
 
 
 def analysis_cost(entries: list[Entry]) -> str:
@@ -127,9 +162,12 @@ def main(arguments: list[str]) -> int:
     entries = load(paths)
     console = Console() if sys.stdout.isatty() else Console(width=WIDTH)
     console.print(stage_table(entries))
+    street = street_table(entries)
+    if street.row_count:
+        console.print(street)
     console.print(tree_table(entries))
-    console.print(period_share(entries), highlight=False)
-    console.print(plugin_cost(entries))
+    for line in (*period_share(entries), *plugin_cost(entries)):
+        console.print(line, highlight=False)
     console.print(analysis_cost(entries))
     return 0
 

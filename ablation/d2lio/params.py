@@ -36,10 +36,12 @@ def _merge(entries: Mapping[str, list[Entry]]) -> dict[tuple[str, ...], list[Ent
 
 
 def _default(by_host: Mapping[str, str]) -> str:
-    values = set(by_host.values())
-    if len(values) == 1:
-        return values.pop()
-    return ", ".join(f"{value or '-'} ({host})" for host, value in by_host.items())
+    hosts: dict[str, list[str]] = {}
+    for host, value in by_host.items():
+        hosts.setdefault(value, []).append(host)
+    if len(hosts) == 1:
+        return next(iter(hosts))
+    return "; ".join(f"{value or '-'} ({', '.join(names)})" for value, names in hosts.items())
 
 
 def _tables(entries: list[Entry]) -> list[str]:

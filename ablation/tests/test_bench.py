@@ -84,11 +84,11 @@ def test_growth_compares_the_last_third_with_all_before_it() -> None:
     assert growth([1.0, 1.0]) == float("inf")
 
 
-def _drive(map_mb: list[float], end_error_m: float = 10.0) -> Drive:
+def _drive(map_mb: list[float], drift: float = 0.01) -> Drive:
     n = len(map_mb)
     return Drive(
-        "d2lio", [float(i) for i in range(n)], map_mb, [100.0] * n, [5.0] * n, 600 * n, 9000.0,
-        end_error_m,
+        "d2lio", [float(i) for i in range(n)], map_mb, [100.0] * n, [5.0] * n,
+        [0.01] * (n - 1) + [drift], 600 * n, 9000.0,
     )  # fmt: skip
 
 
@@ -96,15 +96,23 @@ def test_verdict() -> None:
     steady = [5.0, 40.0, 50.0, 50.0, 51.0, 51.0]
     assert verdict(_drive(steady)).startswith("memory: PASS, bounded: map 5 -> 51 MB (peak 51")
     assert "FAIL, growing" in verdict(_drive([float(i) for i in range(1, 10)]))
-    assert "got lost" in verdict(_drive(steady, end_error_m=2000.0))
+    assert "got lost" in verdict(_drive(steady, drift=0.2))
 
 
 def test_half_the_scan_period() -> None:
-    entry = {"name": "BM_D2LioScan/1/real_time", "total_ms": 20.0}
-    two_threads = {"name": "BM_D2LioScan/2/real_time", "total_ms": 90.0}
-    assert "PASS: 20.0 ms on one core is 0.40" in bench_summary.period_share([entry, two_threads])
-    assert "FAIL" in bench_summary.period_share([entry | {"total_ms": 55.0}])
-    assert "not measured" in bench_summary.period_share([])
+    entry = {
+        "name": "BM_ScanD2Lio/speed:8/iterations:60/manual_time",
+        **{f"{stage}_ms": 3.0 for stage in bench_summary.STAGES},
+        "mean_ms": 20.0, "p95_ms": 25.0, "cpu_ms": 19.0,
+    }  # fmt: skip
+    off = entry | {"name": "BM_ScanD2LioOff/speed:8/iterations:60/manual_time", "mean_ms": 90.0}
+    lost = entry | {"error_occurred": True, "error_message": "the estimate left the street"}
+    (line,) = bench_summary.period_share([entry, off])
+    assert "at 8 m/s: PASS: 20.0 ms on one core (19.0 ms of CPU time) is 0.40 of half" in line
+    assert "FAIL" in bench_summary.period_share([entry | {"mean_ms": 55.0}])[0]
+    assert "FAIL: the estimate left the street" in bench_summary.period_share([lost])[0]
+    assert "not measured" in bench_summary.period_share([])[0]
+    assert bench_summary.street_table([entry, off, lost]).row_count == 3
 
 
 @needs_gtsam
@@ -113,7 +121,8 @@ def test_a_short_drive_holds(tmp_path: Path, capsys: pytest.CaptureFixture[str])
     assert bench_drive.main(["--minutes", "0.3", "--out", str(out)]) == 0
     drive = json.loads(out.read_text())
     assert drive["scans"] >= 170
-    assert drive["end_error_m"] < 0.02 * drive["path_m"]
+    assert max(drive["drift"]) < 0.02
+    assert drive["path_m"] > 100.0
     assert len(drive["minutes"]) == len(drive["rss_mb"]) == len(drive["map_mb"]) == 1
     assert "memory:" in capsys.readouterr().out
 
