@@ -197,18 +197,20 @@ void bind_result(nb::module_& m) {
         .def_prop_ro(
             "covariance", [](const Result& r) { return to_numpy(r.covariance); },
             nb::rv_policy::automatic, "float64 [6, 6], x y z rx ry rz, map frame, m^2 and rad^2")
-        .def_prop_ro("diagnostics", [](const Result& r) { return diagnostics(r); }, "every figure of the scan, by column");
+        .def_prop_ro(
+            "diagnostics", [](const Result& r) { return diagnostics(r); },
+            "every figure of the scan, by column");
 }
 
 /// Binds one host class, `Host` constructible from (ParamMap, int), with its results as `Result`.
 template <typename Host, typename Result>
 void bind_host(nb::module_& m, const char* name, const char* doc) {
     using SharedHost = Shared<Host>;
-    nb::class_<SharedHost>(
-m, name, doc)
-        .def(nb::init<const ParamMap&, int>(), "params"_a = ParamMap{},
-             "threads"_a = 1, "Raises ConfigError (key, value, allowed) for anything unusable.")
-        .def_static("describe", &describe<Host>, "Every parameter: key, type, default, range, unit, doc.")
+    nb::class_<SharedHost>(m, name, doc)
+        .def(nb::init<const ParamMap&, int>(), "params"_a = ParamMap{}, "threads"_a = 1,
+             "Raises ConfigError (key, value, allowed) for anything unusable.")
+        .def_static("describe", &describe<Host>,
+                    "Every parameter: key, type, default, range, unit, doc.")
         .def("add_imu", &add_imu<Host>, "stamps"_a.noconvert(), "gyro"_a, "accel"_a,
              "orientation"_a.none() = nb::none(),
              "int64 [N] ns; float64 [N, 3] rad/s; float64 [N, 3] m/s^2; float64 [N, 4] x y z w of "

@@ -6,7 +6,7 @@
 #include <cmath>
 #include <map>
 
-#include "drive.hpp"
+#include "fastlio_drive.hpp"
 
 namespace d2lio::fastlio {
 namespace {

@@ -23,7 +23,8 @@ NB_MODULE(_liosam, m) {
     bind_result<Result>(m);
     bind_host<PresetHost<liosam::Preset::kLioSam>, Result>(
         m, "LioSamHost",
-        "LiDAR-inertial odometry that behaves like LIO-SAM. Calls from several threads take turns.");
+        "LiDAR-inertial odometry that behaves like LIO-SAM. Calls from several threads take "
+        "turns.");
     bind_host<PresetHost<liosam::Preset::kD2Lio>, Result>(
         m, "D2LioHost",
         "The paper's modified LIO-SAM: direct front end, point-adaptive rejection, directional "

@@ -26,8 +26,8 @@ void Plugin::Core::rebuild() {
 
 Status Plugin::Core::begin(bool usable, const Pose& previous) {
     current = ScanDiagnostics{};
-    in_scan = usable && is_finite(predicted) && is_finite(previous) && P_r.allFinite() &&
-              P_t.allFinite();
+    in_scan =
+        usable && is_finite(predicted) && is_finite(previous) && P_r.allFinite() && P_t.allFinite();
     if (!in_scan) return Status::kBadInput;
     rejector.begin_scan(previous.inverse() * predicted);
     current.sigma = rejector.sigma();

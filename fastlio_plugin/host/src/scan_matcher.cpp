@@ -17,10 +17,7 @@ constexpr float kUnbounded = std::numeric_limits<float>::infinity();
 }  // namespace
 
 ScanMatcher::ScanMatcher(Adapter& adapter, bool extrinsic_est, double variance, int threads)
-    : adapter_(adapter),
-      extrinsic_est_(extrinsic_est),
-      variance_(variance),
-      loop_(threads) {}
+    : adapter_(adapter), extrinsic_est_(extrinsic_est), variance_(variance), loop_(threads) {}
 
 void ScanMatcher::begin(const std::vector<Eigen::Vector3f>& points, const IkdTree& tree) {
     points_ = &points;

@@ -167,7 +167,8 @@ Status Adapter::condition(const double* pose, double variance, const NormalEquat
     Vec6 Atb = J_inverse.transpose() * Vec6Map(equations.Atb);
     const Mat3 R = rotation_of(pose);
     const Vec3 t(pose[3], pose[4], pose[5]);
-    const Status status = condition_tangent({R.data(), t.data()}, variance, {AtA.data(), Atb.data()});
+    const Status status =
+        condition_tangent({R.data(), t.data()}, variance, {AtA.data(), Atb.data()});
     if (status != Status::kOk || !has_prior()) return status;
     Mat6Map(equations.AtA) = J.transpose() * AtA * J;
     Vec6Map(equations.Atb) = J.transpose() * Atb;

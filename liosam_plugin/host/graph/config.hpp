@@ -28,7 +28,7 @@ struct HostConfig {
 
     IntakeConfig intake;
     FrontEnd front_end = FrontEnd::kFeatures;
-    Deskew deskew = Deskew::kRotation;
+    Deskew deskew = Deskew::kFull;
     ProjectionOptions projection;
     SubmapOptions submap;  ///< but for the fields that follow
     MatchOptions matching;
@@ -37,10 +37,10 @@ struct HostConfig {
     double odometry_leaf = 0.4;                            ///< m, voxel of a ring's surfaces
     double corner_leaf = 0.2, surface_leaf = 0.4;          ///< m, voxels of scan and submap
     int max_clouds = 1500;                                 ///< keyframe clouds kept
-    double direct_leaf = 0.4;                      ///< m, voxel of the scan, front end direct
-    double kernel_scale = 0.2;                     ///< m, front end direct
-    int min_corners = 10, min_surfaces = 100;      ///< features that matching needs
-    double mapping_interval = 0.15;                ///< s
+    double direct_leaf = 0.3;                  ///< m, voxel of the scan, front end direct
+    double kernel_scale = 0.2;                 ///< m, front end direct
+    int min_corners = 10, min_surfaces = 100;  ///< features that matching needs
+    double mapping_interval = 0.15;            ///< s
     double correction_rotation = 0.05, correction_translation = 0.1;  ///< rad, m
     double degenerate_rotation = 1.0, degenerate_translation = 1.0;   ///< rad, m
     double rpy_weight = 0.01;     ///< of a 9-axis orientation's roll and pitch

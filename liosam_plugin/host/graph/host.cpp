@@ -11,10 +11,12 @@
 #include "front_end.hpp"
 #include "keyframe_graph.hpp"
 #include "predictor.hpp"
+#include "projection_rings.hpp"
 
 namespace d2lio::liosam {
 namespace {
 
+constexpr int kStartScans = 5;    ///< processed whatever the mapping interval
 constexpr int kMaxFailures = 10;  ///< refused matches in a row before starting anew
 
 HostConfig load(Preset preset, const ParamMap& params, int threads, Adapter& adapter) {
@@ -70,7 +72,7 @@ class Host::Impl {
     bool enough_features() const;
     Pose match(ScanResult& r);
     void judge(const MatchReport& report, ScanResult& r);
-    void correct(const Pose& estimate, const Mat6& covariance, ScanResult& r);
+    void correct(const Pose& estimate, ScanResult& r);
     void grow_map(const MeasureGroup& group, ScanResult& r);
     void begin_epoch();
     void finish(ScanResult& r) const;
@@ -80,7 +82,8 @@ class Host::Impl {
     Pose previous_;  ///< last estimate, T_map_imu
     std::optional<Stamp> last_processed_;
     MatchReport report_;
-    int failures_ = 0;  ///< refused matches in a row
+    int processed_ = 0;  ///< scans since the start
+    int failures_ = 0;   ///< refused matches in a row
     std::size_t resets_ = 0, degenerate_ = 0, lost_ = 0, graph_events_ = 0;
     Mat6 covariance_ = Mat6::Zero();  ///< of the last estimate: rotation (body), position (map)
     StopWatch watch_;
@@ -93,6 +96,7 @@ void Host::Impl::begin_epoch() {
     imu_graph_.clear();
     adapter_.reset();
     last_processed_.reset();
+    processed_ = 0;
     failures_ = 0;
 }
 
@@ -117,6 +121,7 @@ void Host::Impl::process(MeasureGroup& group, ScanResult& r) {
         return;
     }
     last_processed_ = group.begin;
+    ++processed_;
     prepare(group, r);
     if (map_.empty()) {
         start_map(group, r);
@@ -124,15 +129,15 @@ void Host::Impl::process(MeasureGroup& group, ScanResult& r) {
     }
     r.has_pose = true;
     const Pose estimate = match(r);
-    correct(estimate, covariance_, r);
+    correct(estimate, r);
     if (r.status != ScanStatus::kNumericalFailure) grow_map(group, r);
 }
 
 /// Scans before the estimator runs. True if this one was of them.
 bool Host::Impl::start_up(const MeasureGroup& group, ScanResult& r) {
-    const std::string reason =
-        failures_ >= kMaxFailures ? std::to_string(failures_) + " matches refused in a row"
-                                  : intake_.reset_reason(group, predictor_.initialised());
+    const std::string reason = failures_ >= kMaxFailures
+                                   ? std::to_string(failures_) + " matches refused in a row"
+                                   : intake_.reset_reason(group, predictor_.initialised());
     if (!reason.empty()) {
         begin_epoch();
         if (!group.new_epoch) ++resets_;
@@ -159,9 +164,10 @@ bool Host::Impl::predict(const MeasureGroup& group, ScanResult& r) {
     return false;
 }
 
-/// LIO-SAM's mapping interval, counted between scan begins.
+/// LIO-SAM's mapping interval, counted between scan begins. The first scans are all processed: with
+/// them the graph learns the speed of a vehicle that was moving already.
 bool Host::Impl::due(const MeasureGroup& group) const {
-    return !last_processed_ ||
+    return !last_processed_ || processed_ < kStartScans ||
            seconds_between(group.begin, *last_processed_) >= config_.mapping_interval;
 }
 
@@ -173,6 +179,9 @@ void Host::Impl::prepare(MeasureGroup& group, ScanResult& r) {
     if (config_.deskew == Deskew::kRotation) {
         end.t.setZero();
         for (MotionKnot& k : knots) k.pos = k.vel = k.accel = Vec3::Zero();
+    }
+    if (config_.front_end == FrontEnd::kFeatures && !has_rings(group.scan.points)) {
+        assign_rings_by_turns(group.scan.points);  // clouds laser by laser, as KITTI's
     }
     raw_ = group.scan.points;
     deskew(group.scan.points, knots, end, x.T_imu_lidar());
@@ -265,14 +274,13 @@ void Host::Impl::judge(const MatchReport& report, ScanResult& r) {
 }
 
 /// Hands the estimate to the inertial graph and takes back what it knows of velocity and biases.
-void Host::Impl::correct(const Pose& estimate, const Mat6& covariance, ScanResult& r) {
+void Host::Impl::correct(const Pose& estimate, ScanResult& r) {
     CorrectionNoise noise{config_.correction_rotation, config_.correction_translation,
                           config_.degenerate_rotation, config_.degenerate_translation};
     const bool own_remedy = !adapter_.has_prior();
     const Mat6 C = report_.status != MatchStatus::kOk ? lost_covariance(noise)
-                   : own_remedy ? upstream_correction(noise, report_.remapped)
-                                : weak_correction(noise, r.diagnostics);
-    (void)covariance;
+                   : own_remedy                       ? upstream_correction(noise, report_.remapped)
+                                                      : weak_correction(noise, r.diagnostics);
     const GraphStatus status = imu_graph_.correct(estimate, C, predictor_.steps());
     if (status != GraphStatus::kOk) {
         ++graph_events_;
@@ -323,9 +331,13 @@ std::vector<ParamInfo> Host::describe(Preset preset) {
     HostConfig config(preset);
     ParamTable table;
     config.bind(table);
-    Adapter adapter;
-    configure(adapter_defaults(preset), table, adapter);
-    return d2lio::describe(table, adapter);
+    std::vector<ParamInfo> out = d2lio::describe(table, Adapter());
+    const ParamMap preset_values = adapter_defaults(preset);
+    for (ParamInfo& info : out) {
+        const auto it = preset_values.find(info.key);
+        if (it != preset_values.end()) info.default_value = it->second;
+    }
+    return out;
 }
 
 PushStatus Host::add_imu(const ImuSample& sample) { return impl_->intake_.add_imu(sample); }

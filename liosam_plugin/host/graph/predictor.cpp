@@ -22,9 +22,9 @@ constexpr double kBeforeScan = -1e-9;   ///< s: points at the scan's begin are m
 
 constexpr double kStandardGravity = 9.80665;  ///< m/s^2 per g
 /// Of the start, relative to the map that begins there.
-constexpr double kStartSpeed = 1.0;        ///< m/s
-constexpr double kStartGravity = 1e-3;     ///< rad, of the direction between two scans
-constexpr double kNoWeight = 1e-12;        ///< keeps a covariance definite, rad^2 and m^2
+constexpr double kStartSpeed = 1.0;     ///< m/s
+constexpr double kStartGravity = 1e-3;  ///< rad, of the direction between two scans
+constexpr double kNoWeight = 1e-12;     ///< keeps a covariance definite, rad^2 and m^2
 
 /// R_map_imu with the given up direction (IMU frame) and no yaw.
 Mat3 levelled(const Vec3& up) {

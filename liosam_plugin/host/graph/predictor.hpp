@@ -38,7 +38,8 @@ class Predictor {
     const std::vector<ImuStep>& steps() const { return steps_; }
     double mean_period() const { return stepper_.mean_period(); }
     const std::string& note() const { return start_.note(); }
-    /// R_world_imu of a 9-axis sensor, newest sample; nothing where there is none or it is not used.
+    /// R_world_imu of a 9-axis sensor, newest sample; nothing where there is none or it is not
+    /// used.
     std::optional<Mat3> orientation() const;
     void reset();
 

@@ -39,8 +39,7 @@ Mat6 weak_correction(const CorrectionNoise& n, const ScanDiagnostics& s) {
     Mat6 C = diagonal(n.rotation, n.translation);
     if (!s.v_r.allFinite() || !s.v_t.allFinite()) return C;
     C.topLeftCorner<3, 3>() = widened(n.rotation, n.degenerate_rotation, s.v_r, s.weak_r);
-    C.bottomRightCorner<3, 3>() =
-        widened(n.translation, n.degenerate_translation, s.v_t, s.weak_t);
+    C.bottomRightCorner<3, 3>() = widened(n.translation, n.degenerate_translation, s.v_t, s.weak_t);
     return C;
 }
 

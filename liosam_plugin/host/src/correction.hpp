@@ -32,8 +32,8 @@ Mat6 start_covariance();
 /// Position, then rotation about the map's axes.
 Mat6 ros_order(const Pose& T_map_imu, const Mat6& covariance);
 
-/// Turns roll and pitch of `R` (R_map_imu) by a share `weight` towards those of `world` (R_world_imu
-/// of a 9-axis IMU). Yaw stays. Nothing changes near 90 deg of pitch.
+/// Turns roll and pitch of `R` (R_map_imu) by a share `weight` towards those of `world`
+/// (R_world_imu of a 9-axis IMU). Yaw stays. Nothing changes near 90 deg of pitch.
 Mat3 blend_tilt(const Mat3& R, const Mat3& world, double weight);
 
 }  // namespace d2lio::liosam

@@ -8,10 +8,10 @@
 #include <cmath>
 #include <limits>
 
+#include "d2lio/geometry/plane.hpp"
 #include "d2lio/geometry/so3.hpp"
 #include "d2lio/host/stop_watch.hpp"
 #include "line_fit.hpp"
-#include "d2lio/geometry/plane.hpp"
 
 namespace d2lio::liosam {
 namespace {
@@ -93,10 +93,9 @@ int ScanToMap::linearise(const MatchInput& in, const Pose& T, Mat6& AtA, Vec6& A
     const std::size_t corners = in.corners.size();
     rows_.resize(corners + in.surfaces.size());
     loop_(rows_.size(), [&](std::size_t i) {
-        rows_[i] = i < corners
-                       ? match(Feature::kCorner, i, in.corners[i], in.corner_map, T)
-                       : match(Feature::kSurface, i - corners, in.surfaces[i - corners],
-                               in.surface_map, T);
+        rows_[i] = i < corners ? match(Feature::kCorner, i, in.corners[i], in.corner_map, T)
+                               : match(Feature::kSurface, i - corners, in.surfaces[i - corners],
+                                       in.surface_map, T);
     });
     AtA.setZero();
     Atb.setZero();

@@ -16,11 +16,12 @@ using Vec6 = Eigen::Matrix<double, 6, 1>;
 
 struct MatchOptions {
     int max_iterations = 30;
-    double rotation_epsilon = 0.05;      ///< deg, a smaller step ends the iterations
-    double translation_epsilon = 0.05;   ///< cm, likewise
-    int min_rows = 50;                   ///< accepted features that a step needs
-    double eigenvalue_threshold = 100.0;  ///< of A^T A, for the host's own solution remapping; 0: off
-    double variance = 1e-3;              ///< m^2, of a row of unit weight
+    double rotation_epsilon = 0.05;     ///< deg, a smaller step ends the iterations
+    double translation_epsilon = 0.05;  ///< cm, likewise
+    int min_rows = 50;                  ///< accepted features that a step needs
+    double eigenvalue_threshold =
+        100.0;               ///< of A^T A, for the host's own solution remapping; 0: off
+    double variance = 1e-3;  ///< m^2, of a row of unit weight
     /// Scale of the Cauchy kernel, m. 0: LIO-SAM's weight, which falls with the distance and rises
     /// with the square root of the range.
     double kernel_scale = 0.0;
@@ -28,7 +29,7 @@ struct MatchOptions {
 
 enum class MatchStatus {
     kOk,
-    kFewRows,           ///< fewer accepted features than a step needs: the pose stays as it was then
+    kFewRows,  ///< fewer accepted features than a step needs: the pose stays as it was then
     kNumericalFailure,  ///< a step was not finite: the pose is the initial guess
 };
 
@@ -36,9 +37,10 @@ struct MatchReport {
     MatchStatus status = MatchStatus::kFewRows;
     int iterations = 0;
     bool converged = false;
-    bool degenerate = false;      ///< some direction is weak, judged on the scan's own rows
-    bool remapped = false;        ///< the host's own remapping held back some direction
-    Mat6 information = Mat6::Zero();  ///< A^T A of the scan's rows at the last iterate; tangent order
+    bool degenerate = false;  ///< some direction is weak, judged on the scan's own rows
+    bool remapped = false;    ///< the host's own remapping held back some direction
+    Mat6 information =
+        Mat6::Zero();  ///< A^T A of the scan's rows at the last iterate; tangent order
     double search_ms = 0.0;
 };
 

@@ -33,9 +33,9 @@ struct IntakeConfig {
     PointFilterOptions filter;
     SynchronizerOptions sync;
     GapBounds gaps;
-    bool live = false;     ///< bounded queues: the oldest scan is dropped rather than falling behind
-    int init_samples = 10;  ///< inertial samples averaged at the start
-    double extrinsic_T[3] = {0, 0, 0};                    ///< t_imu_lidar, m
+    bool live = false;  ///< bounded queues: the oldest scan is dropped rather than falling behind
+    int init_samples = 10;              ///< inertial samples averaged at the start
+    double extrinsic_T[3] = {0, 0, 0};  ///< t_imu_lidar, m
     double extrinsic_R[9] = {1, 0, 0, 0, 1, 0, 0, 0, 1};  ///< R_imu_lidar, by rows
 
     void bind(ParamTable& table);

@@ -33,8 +33,8 @@ struct Plugin::Core {
     std::vector<std::pair<std::string, double>> columns = last.columns();
 
     bool in_scan = false;
-    Pose predicted;                                           ///< T_map_imu
-    Mat3 P_r = Mat3::Identity(), P_t = Mat3::Identity();      ///< of the prediction, rad^2, m^2
+    Pose predicted;                                       ///< T_map_imu
+    Mat3 P_r = Mat3::Identity(), P_t = Mat3::Identity();  ///< of the prediction, rad^2, m^2
 
     Core();
     void rebuild();

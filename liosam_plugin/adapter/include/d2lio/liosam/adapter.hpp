@@ -12,9 +12,9 @@
 /// two sides may be built with different standards and Eigen alignments. Lengths in m, angles in
 /// rad. "Body" is the frame whose pose is estimated: the IMU here, upstream's lidar_link there.
 ///
-/// Per scan: begin_scan; in each iteration gate() and, where a line or plane fits, weigh() for every
-/// feature (any thread, any order), then condition() on the normal equations; end_scan. Nothing
-/// throws or exits but for lack of memory.
+/// Per scan: begin_scan; in each iteration gate() and, where a line or plane fits, weigh() for
+/// every feature (any thread, any order), then condition() on the normal equations; end_scan.
+/// Nothing throws or exits but for lack of memory.
 namespace d2lio {
 namespace liosam {
 
@@ -34,10 +34,10 @@ struct ScanInput {
 
 struct Candidate {
     Feature feature;
-    std::size_t index;           ///< of the feature in its cloud
-    double range;                ///< distance of the point from the body's origin
-    const float* sq_distances;   ///< to the nearest map points, ascending
-    std::size_t distance_step;   ///< floats from one to the next
+    std::size_t index;          ///< of the feature in its cloud
+    double range;               ///< distance of the point from the body's origin
+    const float* sq_distances;  ///< to the nearest map points, ascending
+    std::size_t distance_step;  ///< floats from one to the next
     int neighbour_count;
 };
 

@@ -6,7 +6,8 @@
 #include <string>
 #include <vector>
 
-#include "d2lio/fastlio/host.hpp"
+#include "d2lio/host/configure.hpp"
+#include "d2lio/host/result.hpp"
 #include "synthetic_room.hpp"
 
 namespace d2lio::test {
@@ -20,14 +21,15 @@ inline ParamMap room_params(ParamMap extra = {}) {
         for (int c = 0; c < 3; ++c) R += std::to_string(T.R(r, c)) + " ";
     }
     ParamMap params{{"mapping.extrinsic_R", R},
-                             {"mapping.extrinsic_T", t},
-                             {"point_filter_num", "1"},
-                             {"preprocess.blind", "0.3"}};
+                    {"mapping.extrinsic_T", t},
+                    {"point_filter_num", "1"},
+                    {"preprocess.blind", "0.3"}};
     for (auto& [key, value] : extra) params[key] = value;
     return params;
 }
 
-inline void step_all(fastlio::Host& host, std::vector<ScanResult>& out) {
+template <typename Host>
+void step_all(Host& host, std::vector<ScanResult>& out) {
     while (auto r = host.step()) out.push_back(std::move(*r));
 }
 
@@ -38,8 +40,8 @@ struct Drive {
     std::function<bool(ImuSample&)> keep_imu = [](ImuSample&) { return true; };
     std::function<bool(int, Scan&)> edit = [](int, Scan&) { return true; };
 
-    void feed(fastlio::Host& host, SyntheticRoom& room,
-              std::vector<ScanResult>& out) const {
+    template <typename Host>
+    void feed(Host& host, SyntheticRoom& room, std::vector<ScanResult>& out) const {
         Stamp imu = start;
         for (int i = 0; i < scans; ++i) {
             const Stamp begin = start + i * SyntheticRoom::kScanPeriod;
@@ -54,10 +56,10 @@ struct Drive {
     }
 };
 
-inline std::vector<ScanResult> run(const ParamMap& extra = {}, int threads = 1,
-                                            const Drive& drive = {}) {
+/// Everything a fresh host makes of the drive.
+template <typename Host>
+std::vector<ScanResult> run_host(Host host, const Drive& drive) {
     SyntheticRoom room;
-    fastlio::Host host(room_params(extra), threads);
     std::vector<ScanResult> out;
     drive.feed(host, room, out);
     host.finish();
@@ -67,8 +69,7 @@ inline std::vector<ScanResult> run(const ParamMap& extra = {}, int threads = 1,
 
 /// Largest distance (m) between estimate and truth, both relative to the first pose; infinity when
 /// fewer than `missing` short of all scans have a pose.
-inline double largest_error(const std::vector<ScanResult>& results,
-                            std::size_t missing = 3) {
+inline double largest_error(const std::vector<ScanResult>& results, std::size_t missing = 3) {
     const ScanResult* first = nullptr;
     double worst = 0.0;
     std::size_t poses = 0;
