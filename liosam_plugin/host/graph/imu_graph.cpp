@@ -62,14 +62,14 @@ bool is_within(const Vec3& v, double bound) { return v.allFinite() && v.norm() <
 Mat6x6 sane_covariance(const Mat6x6& covariance, bool& repaired) {
     repaired = true;
     if (!covariance.allFinite()) return Mat6x6::Identity();
-    const Mat6x6 P = 0.5 * (covariance + covariance.transpose());
+    Mat6x6 P = 0.5 * (covariance + covariance.transpose());
     const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> solver{Eigen::MatrixXd(P)};
     const Eigen::VectorXd& values = solver.eigenvalues();
     if (values.minCoeff() >= kMinVariance && values.maxCoeff() <= kMaxVariance) {
         repaired = false;
         return P;
     }
-    const Eigen::MatrixXd V = solver.eigenvectors();
+    const Eigen::MatrixXd& V = solver.eigenvectors();
     return V * values.cwiseMax(kMinVariance).cwiseMin(kMaxVariance).asDiagonal() * V.transpose();
 }
 

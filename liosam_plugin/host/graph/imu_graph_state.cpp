@@ -27,7 +27,7 @@ std::array<Block, 3> blocks(const StateKeys& keys) {
 /// Copies the rows of `row`'s variable, in the conditional it is a frontal of, into R.
 void copy_rows(const gtsam::GaussianConditional& conditional, const Block& row,
                const std::array<Block, 3>& all, Eigen::MatrixXd& R) {
-    const auto model = conditional.get_model();
+    const auto& model = conditional.get_model();
     if (model && model->isConstrained()) throw std::logic_error("latest state has an equality");
     auto it = conditional.beginFrontals();
     Eigen::Index first = 0;
