@@ -17,6 +17,9 @@ from d2lio.hosts import describe, load_host
 from d2lio.simulator import simulate
 from d2lio.source_params import source_params
 
+# LIO-SAM's own test, eigenvalues below 100 in rad and m mixed, calls one scan in ten degenerate.
+ROOM_OK_SHARE = {"fastlio": 0.95, "liosam": 0.85, "d2lio": 0.95}
+
 pytestmark = pytest.mark.parametrize("host", host_params())
 
 
@@ -31,7 +34,7 @@ def test_the_room_is_not_called_degenerate(host: str, room: Path, tmp_path: Path
     options = runner.RunOptions(host=host, rejection="point_adaptive")
     record = runner.run(open_source(room), options, tmp_path / "run")
     assert record.status == "complete"
-    assert record.health.get("OK", 0) >= 0.95 * (sum(record.health.values()) - 3)
+    assert record.health.get("OK", 0) >= ROOM_OK_SHARE[host] * (sum(record.health.values()) - 3)
 
 
 @pytest.mark.parametrize("mode", ["off", "point_adaptive"])

@@ -29,6 +29,7 @@ INDOOR = {
     "mappingCornerLeafSize": "0.1",
     "mappingSurfLeafSize": "0.2",
 }
+START_SCANS = 6  # at most so many are all taken, while biases settle
 SHORT_S = 4.0  # two of them at rest
 # Every rejection mode and every method, and D2-LIO's own pair.
 MODES = (
@@ -94,9 +95,9 @@ def test_its_own_parameters_are_refused_by_name(key: str, value: str) -> None:
 def test_lio_sam_gives_poses_at_its_mapping_interval(room: Path, tmp_path: Path) -> None:
     options = runner.RunOptions(host="liosam", max_scans=40)
     record = runner.run(open_source(room), options, tmp_path / "run")
-    assert record.scans.dropped["no_pose_skipped"] == pytest.approx(20, abs=2)
+    assert record.scans.dropped["no_pose_skipped"] == pytest.approx(18, abs=2)
     stamps = np.loadtxt(tmp_path / "run" / "trajectory.tum")[:, 0]
-    assert np.diff(stamps) == pytest.approx(0.2, abs=0.01)
+    assert np.diff(stamps)[START_SCANS:] == pytest.approx(0.2, abs=0.01)
 
 
 @pytest.fixture(scope="module", params=sorted(SCENES))
