@@ -10,6 +10,8 @@ function(d2lio_own target)
   if(D2LIO_SANITIZE)
     target_compile_options(${target} PUBLIC -fsanitize=${D2LIO_SANITIZE}
                            -fno-sanitize-recover=all -fno-omit-frame-pointer)
+    # Under AddressSanitizer Eigen would allocate in another way than in libraries built without it.
+    target_compile_definitions(${target} PUBLIC EIGEN_MALLOC_ALREADY_ALIGNED=1)
     target_link_options(${target} PUBLIC -fsanitize=${D2LIO_SANITIZE})
   endif()
 endfunction()

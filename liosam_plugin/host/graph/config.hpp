@@ -38,7 +38,7 @@ struct HostConfig {
     double corner_leaf = 0.2, surface_leaf = 0.4;          ///< m, voxels of scan and submap
     int max_clouds = 1500;                                 ///< keyframe clouds kept
     double direct_leaf = 0.3;                  ///< m, voxel of the scan, front end direct
-    double kernel_scale = 0.2;                 ///< m, front end direct
+    double kernel_scale = 0.1;                 ///< m, front end direct
     int min_corners = 10, min_surfaces = 100;  ///< features that matching needs
     double mapping_interval = 0.15;            ///< s
     double correction_rotation = 0.05, correction_translation = 0.1;  ///< rad, m

@@ -209,7 +209,14 @@ void Host::Impl::start_map(const MeasureGroup& group, ScanResult& r) {
     }
     const NavState& x = predictor_.state();
     previous_ = x.T_map_imu();
-    imu_graph_.start(previous_, x.vel, x.gyro_bias, x.accel_bias);
+    if (imu_graph_.start(previous_, x.vel, x.gyro_bias, x.accel_bias) != GraphStatus::kOk) {
+        begin_epoch();
+        ++resets_;
+        r.status = ScanStatus::kReset;
+        r.new_epoch = true;
+        say(r, "the inertial graph cannot start from this state: starting anew");
+        return;
+    }
     predictor_.correct(previous_, imu_graph_.state());
     covariance_ = start_covariance();
     r.has_pose = true;
@@ -316,6 +323,7 @@ HostCounts Host::Impl::counts() const {
              {"graph_events", graph_events_},
              {"graph_speed_resets", g.speed_resets},
              {"graph_bias_resets", g.bias_resets},
+             {"graph_jump_resets", g.jump_resets},
              {"graph_solver_failures", g.solver_failures + g.non_finite_results},
              {"graph_bridged_intervals", g.bridged_intervals},
              {"keyframes", map_.size()}}};
