@@ -2,7 +2,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include <benchmark/benchmark.h>
 
-#include "../tests/drive.hpp"
+#include "drive.hpp"
 #include "d2lio/fastlio/adapter.hpp"
 
 namespace d2lio::fastlio {
