@@ -39,13 +39,27 @@ static double weight_of(const MatchOptions& o, Feature feature, double distance,
     return 1.0 - kWeightSlope * d / std::sqrt(range);
 }
 
+/// Nearest map points. By the triangle inequality the neighbours of the last search still lie
+/// within its reach plus the query's motion, so bounding the search there changes nothing but its
+/// time.
+void ScanToMap::search(const Eigen::Vector3f& query, const IkdTree& map, Memory& memory,
+                       Neighbours& near) const {
+    constexpr float kRounding = 1.0001F;
+    const float moved = (query - memory.query).norm();
+    const float within = (memory.reach + moved) * (memory.reach + moved) * kRounding;
+    const float gate = bounded_search_ ? kGate : kInfinity;
+    map.knn(query, kNeighbours, within < gate ? within : gate, near);
+    memory.query = query;
+    memory.reach = near.count == kNeighbours ? std::sqrt(near[kNeighbours - 1].sq_dist) : kInfinity;
+}
+
 ScanToMap::Row ScanToMap::match(Feature feature, std::size_t index, const Eigen::Vector3f& p_imu,
-                                const IkdTree& map, const Pose& T) {
+                                const IkdTree& map, const Pose& T, Memory& memory) {
     Row row{Vec6::Zero(), 0.0, false};
     const Vec3 p = p_imu.cast<double>();
     const Eigen::Vector3f q = (T * p).cast<float>();
     Neighbours near;
-    map.knn(q, kNeighbours, bounded_search_ ? kGate : kInfinity, near);
+    search(q, map, memory, near);
 
     float sq[kNeighbours];
     for (int i = 0; i < kNeighbours; ++i) sq[i] = i < near.count ? near[i].sq_dist : kInfinity;
@@ -93,9 +107,10 @@ int ScanToMap::linearise(const MatchInput& in, const Pose& T, Mat6& AtA, Vec6& A
     const std::size_t corners = in.corners.size();
     rows_.resize(corners + in.surfaces.size());
     loop_(rows_.size(), [&](std::size_t i) {
-        rows_[i] = i < corners ? match(Feature::kCorner, i, in.corners[i], in.corner_map, T)
-                               : match(Feature::kSurface, i - corners, in.surfaces[i - corners],
-                                       in.surface_map, T);
+        rows_[i] = i < corners
+                       ? match(Feature::kCorner, i, in.corners[i], in.corner_map, T, memory_[i])
+                       : match(Feature::kSurface, i - corners, in.surfaces[i - corners],
+                               in.surface_map, T, memory_[i]);
     });
     AtA.setZero();
     Atb.setZero();
@@ -157,6 +172,8 @@ bool ScanToMap::step(const MatchInput& input, Pose& T, MatchReport& report) {
 MatchReport ScanToMap::align(const MatchInput& input, Pose& T_map_imu) {
     MatchReport report;
     bounded_search_ = !adapter_.rejects();
+    memory_.assign(input.corners.size() + input.surfaces.size(),
+                   {Eigen::Vector3f::Zero(), kInfinity});
     Pose T = T_map_imu;
     while (report.iterations < options_.max_iterations && step(input, T, report)) {
     }

@@ -69,13 +69,20 @@ class ScanToMap {
         double residual;
         bool used;
     };
+    /// The last search of a feature: the next one need look no farther than its neighbours are now.
+    struct Memory {
+        Eigen::Vector3f query;
+        float reach;  ///< distance of the 5th neighbour, m; infinity before the first search
+    };
     struct Match {
         Eigen::Vector3f normal;
         double distance;
     };
 
+    void search(const Eigen::Vector3f& query, const IkdTree& map, Memory& memory,
+                Neighbours& near) const;
     Row match(Feature feature, std::size_t index, const Eigen::Vector3f& p, const IkdTree& map,
-              const Pose& T);
+              const Pose& T, Memory& memory);
     int linearise(const MatchInput& input, const Pose& T, Mat6& AtA, Vec6& Atb);
     void find_remapping(const Mat6& AtA, MatchReport& report);
     bool step(const MatchInput& input, Pose& T, MatchReport& report);
@@ -85,6 +92,7 @@ class ScanToMap {
     PointLoop loop_;
     bool bounded_search_ = true;
     std::vector<Row> rows_;
+    std::vector<Memory> memory_;
     Mat6 keep_ = Mat6::Identity();
 };
 
