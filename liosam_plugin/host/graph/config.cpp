@@ -89,6 +89,21 @@ void HostConfig::bind(ParamTable& t) {
     t.add("imu.max_speed", imu.max_speed, {0.1, 1e4}, "m/s",
           "a faster estimate starts the graph anew");
     t.add("imu.max_bias", imu.max_bias, {1e-3, 1e3}, "m/s^2, rad/s", "so does a larger bias");
+    bind_loop(t);
+}
+
+void HostConfig::bind_loop(ParamTable& t) {
+    t.add("loopClosureEnableFlag", loop.enabled,
+          "correct the keyframes where a place is seen again");
+    t.add("historyKeyframeSearchRadius", loop.search_radius, {0.1, 1e4}, "m",
+          "how near a keyframe must be to close a loop");
+    t.add("historyKeyframeSearchTimeDiff", loop.min_time, {0.0, 1e6}, "s",
+          "and how much older than the newest");
+    t.add("historyKeyframeSearchNum", loop.neighbours, {0, 10000}, "",
+          "keyframes on either side that are aligned with");
+    t.add("historyKeyframeFitnessScore", loop.max_fitness, {0.0, 1e4}, "m^2",
+          "largest mean squared distance of an accepted loop");
+    t.add("loop.interval", loop.interval, {0.0, 1e6}, "s", "time between two attempts");
 }
 
 void HostConfig::validate() const {

@@ -8,6 +8,7 @@
 #include "features.hpp"
 #include "imu_graph.hpp"
 #include "keyframe_map.hpp"
+#include "loop_closer.hpp"
 #include "projection.hpp"
 #include "scan_to_map.hpp"
 
@@ -33,6 +34,7 @@ struct HostConfig {
     SubmapOptions submap;  ///< but for the fields that follow
     MatchOptions matching;
     ImuGraphOptions imu;
+    LoopOptions loop;
     double edge_threshold = 1.0, surface_threshold = 0.1;  ///< m^2, curvature
     double odometry_leaf = 0.4;                            ///< m, voxel of a ring's surfaces
     double corner_leaf = 0.2, surface_leaf = 0.4;          ///< m, voxels of scan and submap
@@ -51,6 +53,9 @@ struct HostConfig {
     void validate() const;
     FeatureOptions feature_options() const;
     SubmapOptions submap_options() const;
+
+  private:
+    void bind_loop(ParamTable& table);
 };
 
 /// What the preset sets in the adapter.

@@ -2,7 +2,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "d2lio/liosam/host.hpp"
 
-#include <Eigen/Cholesky>
+#include <algorithm>
 
 #include "config.hpp"
 #include "correction.hpp"
@@ -16,8 +16,9 @@
 namespace d2lio::liosam {
 namespace {
 
-constexpr int kStartScans = 5;    ///< processed whatever the mapping interval
-constexpr int kMaxFailures = 10;  ///< refused matches in a row before starting anew
+constexpr int kStartScans = 5;               ///< processed whatever the mapping interval
+constexpr double kLeastLoopVariance = 1e-6;  ///< rad^2 and m^2
+constexpr int kMaxFailures = 10;             ///< refused matches in a row before starting anew
 
 HostConfig load(Preset preset, const ParamMap& params, int threads, Adapter& adapter) {
     HostConfig config(preset);
@@ -46,7 +47,8 @@ class Host::Impl {
           direct_(static_cast<float>(config_.direct_leaf)),
           matcher_(adapter_, config_.matching, config_.threads),
           map_(config_.submap_options()),
-          imu_graph_(config_.imu) {}
+          imu_graph_(config_.imu),
+          loops_(config_.loop, config_.threads) {}
 
     std::optional<ScanResult> step();
     HostCounts counts() const;
@@ -61,6 +63,7 @@ class Host::Impl {
     KeyframeMap map_;
     KeyframeGraph keyframes_;
     ImuGraph imu_graph_;
+    LoopCloser loops_;
 
   private:
     void process(MeasureGroup& group, ScanResult& r);
@@ -74,17 +77,20 @@ class Host::Impl {
     void judge(const MatchReport& report, ScanResult& r);
     void correct(const Pose& estimate, ScanResult& r);
     void grow_map(const MeasureGroup& group, ScanResult& r);
+    void close_loop(ScanResult& r);
+    Mat6 in_odometry(const Mat6& covariance) const;
     void begin_epoch();
     void finish(ScanResult& r) const;
 
     MatchCloud cloud_;
     std::vector<LidarPoint> raw_;
-    Pose previous_;  ///< last estimate, T_map_imu
+    Pose previous_;         ///< last estimate, T_map_imu
+    Pose loop_correction_;  ///< of all loops: T_map_odometry; the inertial graph lives in odometry
     std::optional<Stamp> last_processed_;
     MatchReport report_;
     int processed_ = 0;  ///< scans since the start
     int failures_ = 0;   ///< refused matches in a row
-    std::size_t resets_ = 0, degenerate_ = 0, lost_ = 0, graph_events_ = 0;
+    std::size_t resets_ = 0, degenerate_ = 0, lost_ = 0, graph_events_ = 0, loops_closed_ = 0;
     Mat6 covariance_ = Mat6::Zero();  ///< of the last estimate: rotation (body), position (map)
     StopWatch watch_;
 };
@@ -94,6 +100,8 @@ void Host::Impl::begin_epoch() {
     map_.clear();
     keyframes_.clear();
     imu_graph_.clear();
+    loops_.reset();
+    loop_correction_ = Pose{};
     adapter_.reset();
     last_processed_.reset();
     processed_ = 0;
@@ -288,7 +296,8 @@ void Host::Impl::correct(const Pose& estimate, ScanResult& r) {
     const Mat6 C = report_.status != MatchStatus::kOk ? lost_covariance(noise)
                    : own_remedy                       ? upstream_correction(noise, report_.remapped)
                                                       : weak_correction(noise, r.diagnostics);
-    const GraphStatus status = imu_graph_.correct(estimate, C, predictor_.steps());
+    const GraphStatus status = imu_graph_.correct(loop_correction_.inverse() * estimate,
+                                                  in_odometry(C), predictor_.steps());
     if (status != GraphStatus::kOk) {
         ++graph_events_;
         say(r, status == GraphStatus::kReset ? "speed or bias out of bounds: inertial graph reset"
@@ -302,8 +311,32 @@ void Host::Impl::grow_map(const MeasureGroup& group, ScanResult& r) {
     if (map_.due(previous_, group.end)) {
         map_.add(previous_, group.end, cloud_.corners, cloud_.surfaces);
         keyframes_.add(previous_);
+        close_loop(r);
     }
     r.times.map += watch_.lap();
+}
+
+/// Where the newest keyframe closes a loop: all keyframes move, and the estimate with the newest.
+void Host::Impl::close_loop(ScanResult& r) {
+    const std::optional<Loop> loop = loops_.find(map_);
+    if (!loop) return;
+    const double variance = std::max(loop->fitness, kLeastLoopVariance);
+    const GraphStatus status = keyframes_.add_loop(loop->from, loop->to, loop->T_from_to, variance);
+    if (status != GraphStatus::kOk || !keyframes_.moved()) return;
+    for (std::size_t i = 0; i < map_.size(); ++i) map_.set_pose(i, keyframes_.pose(i));
+    const Pose moved = keyframes_.pose(loop->to) * previous_.inverse();
+    loop_correction_ = moved * loop_correction_;
+    previous_ = keyframes_.pose(loop->to);
+    predictor_.correct(previous_, imu_graph_.state());
+    ++loops_closed_;
+    say(r, "loop closed with keyframe " + std::to_string(loop->from));
+}
+
+/// Position axes of a covariance (rotation body, position map) turned to the inertial graph's.
+Mat6 Host::Impl::in_odometry(const Mat6& C) const {
+    Mat6 J = Mat6::Identity();
+    J.bottomRightCorner<3, 3>() = loop_correction_.R.transpose();
+    return J * C * J.transpose();
 }
 
 void Host::Impl::finish(ScanResult& r) const {
@@ -326,6 +359,7 @@ HostCounts Host::Impl::counts() const {
              {"graph_jump_resets", g.jump_resets},
              {"graph_solver_failures", g.solver_failures + g.non_finite_results},
              {"graph_bridged_intervals", g.bridged_intervals},
+             {"loops", loops_closed_},
              {"keyframes", map_.size()}}};
 }
 

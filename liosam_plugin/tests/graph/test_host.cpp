@@ -5,7 +5,8 @@
 #include <Eigen/Eigenvalues>
 #include <Eigen/Geometry>
 #include <cmath>
-#include <set>
+#include <map>
+#include <string>
 
 #include "liosam_drive.hpp"
 
@@ -51,7 +52,8 @@ TEST(LioSamHost, IntervalSkipsScansButNotTheFirstOnes) {
     std::size_t skipped = 0;
     for (const ScanResult& r : results) {
         skipped += r.status == ScanStatus::kSkipped ? 1 : 0;
-        EXPECT_EQ(r.has_pose, r.status == ScanStatus::kOk || r.status == ScanStatus::kMapInitialised);
+        EXPECT_EQ(r.has_pose,
+                  r.status == ScanStatus::kOk || r.status == ScanStatus::kMapInitialised);
     }
     EXPECT_GE(skipped, 15U);
     EXPECT_EQ(results[3].status, ScanStatus::kOk);
@@ -91,8 +93,8 @@ TEST(LioSamHost, EstimatesTheVelocity) {
     const ScanResult& first = results[1];
     const ScanResult& last = results.back();
     const auto truth = [](const ScanResult& r, double offset) {
-        return test::SyntheticRoom::pose(
-            seconds_between(r.stamp, test::SyntheticRoom::kStart) + offset);
+        return test::SyntheticRoom::pose(seconds_between(r.stamp, test::SyntheticRoom::kStart) +
+                                         offset);
     };
     const Vec3 v_world = (truth(last, 1e-3).t - truth(last, -1e-3).t) / 2e-3;
     const Mat3 world_to_map = first.state.rot * truth(first, 0.0).R.transpose();
@@ -141,6 +143,31 @@ TEST(LioSamHost, MapAndMemoryStayBoundedAtStandstill) {
     }
     EXPECT_LE(host.map_bytes(), early + early / 10);
     EXPECT_GT(early, 0U);
+}
+
+TEST(LioSamHost, LoopsAreClosedAndKeepTheTrajectoryTrue) {
+    const ParamMap params = test::indoor({{"loopClosureEnableFlag", "true"},
+                                          {"historyKeyframeSearchTimeDiff", "3"},
+                                          {"surroundingkeyframeAddingDistThreshold", "0.2"},
+                                          {"historyKeyframeSearchNum", "5"}});
+    test::Drive drive;
+    drive.scans = 100;
+    const auto drive_through = [&](std::size_t& loops) {
+        Host host(Preset::kD2Lio, params);
+        test::SyntheticRoom room;
+        std::vector<ScanResult> results;
+        drive.feed(host, room, results);
+        for (const auto& [name, count] : host.counts().own) {
+            if (std::string(name) == "loops") loops = count;
+        }
+        return results;
+    };
+    std::size_t first = 0, second = 0;
+    const auto results = drive_through(first), again = drive_through(second);
+    EXPECT_GT(first, 0U);
+    EXPECT_LT(test::largest_error(results, 3), kRoomError);
+    ASSERT_EQ(results.size(), again.size());
+    for (std::size_t i = 0; i < results.size(); ++i) EXPECT_TRUE(same(results[i], again[i]));
 }
 
 TEST(LioSamHost, BareKeysAreRefusedByName) {
