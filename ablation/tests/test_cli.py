@@ -153,7 +153,9 @@ def test_interrupted_run_is_marked(sequence: Path, tmp_path: Path) -> None:
     _, said = process.communicate(timeout=60)
     if process.returncode == DONE:
         pytest.skip("the run ended before the signal came")
-    assert process.returncode == INTERRUPTED, said
+    # Where the signal comes while a library compiles code of its own, CPython ends itself by SIGINT
+    # although the interrupt was handled; a shell calls both 130.
+    assert process.returncode in (INTERRUPTED, -signal.SIGINT), said
     assert "o.partial" in said
     assert RunRecord.load(tmp_path / "o.partial").status == "interrupted"
     assert not out.exists()
