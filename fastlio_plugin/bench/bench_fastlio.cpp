@@ -2,8 +2,8 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include <benchmark/benchmark.h>
 
-#include "drive.hpp"
 #include "d2lio/fastlio/adapter.hpp"
+#include "drive.hpp"
 
 namespace d2lio::fastlio {
 namespace {

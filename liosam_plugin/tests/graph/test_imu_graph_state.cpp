@@ -72,4 +72,3 @@ TEST(ImuGraphState, PriorWeighsByItsCovariance) {
 
 }  // namespace
 }  // namespace d2lio::liosam
-
