@@ -225,7 +225,7 @@ void Host::Impl::start_map(const MeasureGroup& group, ScanResult& r) {
         say(r, "the inertial graph cannot start from this state: starting anew");
         return;
     }
-    predictor_.correct(previous_, imu_graph_.state());
+    predictor_.correct(previous_, loop_correction_.R, imu_graph_.state());
     covariance_ = start_covariance();
     r.has_pose = true;
     r.health = Health::kOk;
@@ -303,7 +303,7 @@ void Host::Impl::correct(const Pose& estimate, ScanResult& r) {
         say(r, status == GraphStatus::kReset ? "speed or bias out of bounds: inertial graph reset"
                                              : "inertial graph recovered");
     }
-    predictor_.correct(estimate, imu_graph_.state());
+    predictor_.correct(estimate, loop_correction_.R, imu_graph_.state());
     previous_ = estimate;
 }
 
@@ -327,7 +327,7 @@ void Host::Impl::close_loop(ScanResult& r) {
     const Pose moved = keyframes_.pose(loop->to) * previous_.inverse();
     loop_correction_ = moved * loop_correction_;
     previous_ = keyframes_.pose(loop->to);
-    predictor_.correct(previous_, imu_graph_.state());
+    predictor_.correct(previous_, loop_correction_.R, imu_graph_.state());
     ++loops_closed_;
     say(r, "loop closed with keyframe " + std::to_string(loop->from));
 }

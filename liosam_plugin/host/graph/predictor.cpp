@@ -102,28 +102,27 @@ void Predictor::advance(const MeasureGroup& group, double noise_scale) {
     }
 }
 
-/// The graph's pose may differ from the matched one (it trusts that loosely); what it knows of
-/// velocity and gravity is used relative to its own attitude: v_body = R^T v, g_body = R^T g.
-void Predictor::correct(const Pose& T_map_imu, const GraphState& graph) {
+/// The graph's attitude follows gravity and the matched one the map; they may differ by a small
+/// tilt. Its velocity comes from the matched positions, so it is in the map's axes as it stands
+/// (turning it by the tilt would feed the tilt); gravity is known relative to its own attitude,
+/// g_body = R^T g.
+void Predictor::correct(const Pose& T_map_imu, const Mat3& R_map_odometry,
+                        const GraphState& graph) {
     using G = GraphIndex;
     const Mat3 to_body = graph.T_map_imu.R.transpose();
-    const Vec3 v_body = to_body * graph.vel;
     x_.pos = T_map_imu.t;
     x_.rot = T_map_imu.R;
-    x_.vel = T_map_imu.R * v_body;
+    x_.vel = R_map_odometry * graph.vel;
     x_.gravity = T_map_imu.R * to_body * Vec3(0.0, 0.0, -config_.imu.gravity);
     x_.gyro_bias = graph.gyro_bias;
     x_.accel_bias = graph.accel_bias;
 
-    // Error of (velocity in map axes, biases) from the graph's joint covariance.
-    Eigen::Matrix<double, 9, G::kSize> J = Eigen::Matrix<double, 9, G::kSize>::Zero();
-    J.block<3, 3>(0, G::kRot) = T_map_imu.R * hat(v_body);
-    J.block<3, 3>(0, G::kVel) = T_map_imu.R * to_body;
-    J.block<3, 3>(3, G::kGyroBias).setIdentity();
-    J.block<3, 3>(6, G::kAccelBias).setIdentity();
-    const Eigen::Matrix<double, 9, 9> C = J * graph.covariance * J.transpose();
+    // Velocity and both biases lie side by side in the graph's error as in ours.
+    Eigen::Matrix<double, 9, 9> J = Eigen::Matrix<double, 9, 9>::Identity();
+    J.topLeftCorner<3, 3>() = R_map_odometry;
     P_.setZero();
-    P_.block<9, 9>(I::kVel, I::kVel) = C;  // velocity and both biases lie side by side
+    P_.block<9, 9>(I::kVel, I::kVel) =
+        J * graph.covariance.block<9, 9>(G::kVel, G::kVel) * J.transpose();
     P_.block<2, 2>(I::kGravity, I::kGravity).diagonal().setConstant(kStartGravity * kStartGravity);
     steps_.clear();
 }

@@ -25,8 +25,9 @@ class Predictor {
     /// Moves the state to the group's end. @param noise_scale of the process noise, >= 1.
     void advance(const MeasureGroup& group, double noise_scale);
     /// Takes over an estimate at the present time: pose of the scan matching, everything else from
-    /// the graph, turned into the map as the matching sees it. Starts a new horizon.
-    void correct(const Pose& T_map_imu, const GraphState& graph);
+    /// the graph. Starts a new horizon.
+    /// @param R_map_odometry turns the graph's axes into the map's: the rotation of all loops.
+    void correct(const Pose& T_map_imu, const Mat3& R_map_odometry, const GraphState& graph);
 
     const NavState& state() const { return x_; }
     /// 6x6 of the pose relative to the last estimate: rotation (right, body), position (map).
