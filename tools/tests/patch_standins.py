@@ -126,6 +126,7 @@ public:
 _CMAKE = """\
 cmake_minimum_required(VERSION 3.5)
 project({package})
+add_definitions(-DQUOTE=\\")
 # add_executable(old {source})
 set(CMAKE_CXX_FLAGS "-std=c++11")
 set(CMAKE_CXX_FLAGS_RELEASE "-O3")

@@ -17,7 +17,8 @@ _CPP = re.compile(
 )
 _CMAKE = re.compile(
     r"(?P<comment>#\[(?P<a>=*)\[.*?\](?P=a)\]|#[^\n]*)"
-    r"|(?P<string>\[(?P<b>=*)\[.*?\](?P=b)\]|\"(?:\\.|[^\"\\])*\")",
+    r"|(?P<string>\[(?P<b>=*)\[.*?\](?P=b)\]|\"(?:\\.|[^\"\\])*\")"
+    r"|\\.",  # an escaped quote opens no string
     re.DOTALL,
 )
 _XML = re.compile(r"(?P<comment><!--.*?-->)|(?P<string><!\[CDATA\[.*?\]\]>)", re.DOTALL)
