@@ -37,7 +37,11 @@ struct ImuSample {
     /// Of a 9-axis sensor: unit quaternion x y z w of R_world_imu, z up; zeros where there is none.
     Eigen::Vector4d orientation = Eigen::Vector4d::Zero();
 
-    bool has_orientation() const { return orientation.squaredNorm() > 0.25; }
+    /// Whether there is one: NaN, zeros and what is far from unit length are none.
+    bool has_orientation() const {
+        const double length = orientation.norm();
+        return length > 0.99 && length < 1.01;
+    }
 };
 
 /// One LiDAR return in the LiDAR frame, at its own time `Scan::stamp + dt_ns`.

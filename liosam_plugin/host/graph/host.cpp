@@ -16,6 +16,7 @@
 namespace d2lio::liosam {
 namespace {
 
+constexpr int kLeastRings = 4;               ///< turns in a message that are taken for rings
 constexpr int kStartScans = 5;               ///< processed whatever the mapping interval
 constexpr double kLeastLoopVariance = 1e-6;  ///< rad^2 and m^2
 constexpr int kMaxFailures = 10;             ///< refused matches in a row before starting anew
@@ -70,6 +71,7 @@ class Host::Impl {
     bool start_up(const MeasureGroup& group, ScanResult& r);
     bool predict(const MeasureGroup& group, ScanResult& r);
     bool due(const MeasureGroup& group) const;
+    void find_rings(std::vector<LidarPoint>& points, ScanResult& r) const;
     void prepare(MeasureGroup& group, ScanResult& r);
     void start_map(const MeasureGroup& group, ScanResult& r);
     bool enough_features() const;
@@ -179,6 +181,20 @@ bool Host::Impl::due(const MeasureGroup& group) const {
            seconds_between(group.begin, *last_processed_) >= config_.mapping_interval;
 }
 
+/// Clouds without rings get them from the message order where lasers follow one another, as
+/// KITTI's. In any other order features would be nonsense: the scan is left without points then.
+void Host::Impl::find_rings(std::vector<LidarPoint>& points, ScanResult& r) const {
+    if (config_.front_end != FrontEnd::kFeatures || has_rings(points)) return;
+    const int rings = assign_rings_by_turns(points);
+    if (rings >= kLeastRings && rings <= config_.projection.rings) return;
+    if (!points.empty()) {
+        say(r, "no ring index, and " + std::to_string(rings) + " turns in the message for N_SCAN " +
+                   std::to_string(config_.projection.rings) +
+                   ": features cannot be told; use front_end: direct");
+    }
+    points.clear();
+}
+
 /// De-skews to the scan's end and runs the front end.
 void Host::Impl::prepare(MeasureGroup& group, ScanResult& r) {
     const NavState& x = predictor_.state();
@@ -188,9 +204,7 @@ void Host::Impl::prepare(MeasureGroup& group, ScanResult& r) {
         end.t.setZero();
         for (MotionKnot& k : knots) k.pos = k.vel = k.accel = Vec3::Zero();
     }
-    if (config_.front_end == FrontEnd::kFeatures && !has_rings(group.scan.points)) {
-        assign_rings_by_turns(group.scan.points);  // clouds laser by laser, as KITTI's
-    }
+    find_rings(group.scan.points, r);
     raw_ = group.scan.points;
     deskew(group.scan.points, knots, end, x.T_imu_lidar());
     r.times.deskew = watch_.lap();
@@ -263,7 +277,10 @@ Pose Host::Impl::match(ScanResult& r) {
     r.diagnostics.iterations = report_.iterations;
     judge(report_, r);
     if (!enough) r.status = ScanStatus::kTooFewPoints;
-    covariance_ = pose_covariance(P, report_.information, config_.matching.variance);
+    // Unseen motion adds up; a match ends that.
+    covariance_ = report_.status == MatchStatus::kOk
+                      ? pose_covariance(P, report_.information, config_.matching.variance)
+                      : Mat6(covariance_ + P);
     r.times.search = report_.search_ms;
     r.times.update = watch_.lap() - report_.search_ms;
     return estimate;
