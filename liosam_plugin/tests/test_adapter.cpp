@@ -53,13 +53,15 @@ struct Scene {
             Atb += 0.01 * noise(random) * row;
         }
     }
-    ScanInput input(std::size_t corners = 0, std::size_t surfaces = 4) const {
+    /// Points into this scene, so never of a temporary one.
+    ScanInput input(std::size_t corners = 0, std::size_t surfaces = 4) const& {
         return {{previous.R.data(), previous.t.data()},
                 {predicted.R.data(), predicted.t.data()},
                 P.data(),
                 corners,
                 surfaces};
     }
+    ScanInput input(std::size_t = 0, std::size_t = 4) const&& = delete;
 };
 
 /// Five squared distances, rising to `farthest`.
@@ -299,7 +301,8 @@ TEST(LioSamAdapter, BadInputRunsOnTheHostsGatesAndChangesNothing) {
     EXPECT_EQ(a.begin_scan(s.input()), Status::kBadInput);
     EXPECT_EQ(a.gate(Near(0.01F, 2.0F).candidate(0)), kInfinity);  // upstream's 1 m^2
     EXPECT_EQ(a.condition_tangent(view, kVariance, eq), Status::kNoScan);
-    ScanInput none = Scene().input();
+    const Scene whole;
+    ScanInput none = whole.input();
     none.covariance = nullptr;
     EXPECT_EQ(a.begin_scan(none), Status::kBadInput);
     EXPECT_EQ(a.gate(Near().candidate(77)), kInfinity);  // no such feature
