@@ -41,7 +41,14 @@ function(d2lio_upstream target host)
   else()
     target_compile_definitions(${target} PRIVATE D2LIO_ROS=1)
   endif()
-  target_include_directories(${target} PRIVATE "${D2LIO_UPSTREAM_ROOT}/${host}_plugin/ros/include")
+  # The glue is C++14; what upstream asks for stays if it is later (the last -std counts).
+  get_target_property(standard ${target} CXX_STANDARD)
+  if(NOT standard AND CMAKE_CXX_FLAGS MATCHES "-std=(c|gnu)\\+\\+(0x|11)[^=]*$")
+    target_compile_options(${target} PRIVATE -std=c++14)
+  endif()
+  target_include_directories(${target} PRIVATE
+                             "${D2LIO_UPSTREAM_ROOT}/common/ros/include"
+                             "${D2LIO_UPSTREAM_ROOT}/${host}_plugin/ros/include")
   # By property: upstream's own target_link_libraries may have keywords or not, and both may not mix.
   set_property(TARGET ${target} APPEND PROPERTY LINK_LIBRARIES ${library})
 

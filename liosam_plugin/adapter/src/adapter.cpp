@@ -29,12 +29,6 @@ using Vec6 = Eigen::Matrix<double, 6, 1>;
 using Mat6Map = Eigen::Map<Mat6>;
 using Vec6Map = Eigen::Map<Vec6>;
 
-Mat3 rotation_of(const double* rpy) {
-    return (Eigen::AngleAxisd(rpy[2], Vec3::UnitZ()) * Eigen::AngleAxisd(rpy[1], Vec3::UnitY()) *
-            Eigen::AngleAxisd(rpy[0], Vec3::UnitX()))
-        .toRotationMatrix();
-}
-
 /// A term that pins the directions a policy takes from the scan to the prediction, as strongly as
 /// the scan holds its best direction.
 PriorTerm hold(const PriorTerm& term, const Mat6& AtA) {
@@ -55,6 +49,13 @@ void add_rows(const PriorRows& rows, const NormalEquations& eq) {
 }
 
 }  // namespace
+
+void rotation_from_rpy(const double* rpy, double* out) {
+    Eigen::Map<Mat3> R(out);
+    R = (Eigen::AngleAxisd(rpy[2], Vec3::UnitZ()) * Eigen::AngleAxisd(rpy[1], Vec3::UnitY()) *
+         Eigen::AngleAxisd(rpy[0], Vec3::UnitX()))
+            .toRotationMatrix();
+}
 
 void euler_jacobian(double roll, double pitch, double* out) {
     Eigen::Map<Mat3> E(out);
@@ -165,7 +166,8 @@ Status Adapter::condition(const double* pose, double variance, const NormalEquat
 
     Mat6 AtA = J_inverse.transpose() * Mat6Map(equations.AtA) * J_inverse;
     Vec6 Atb = J_inverse.transpose() * Vec6Map(equations.Atb);
-    const Mat3 R = rotation_of(pose);
+    Mat3 R;
+    rotation_from_rpy(pose, R.data());
     const Vec3 t(pose[3], pose[4], pose[5]);
     const Status status =
         condition_tangent({R.data(), t.data()}, variance, {AtA.data(), Atb.data()});

@@ -81,6 +81,8 @@ class Adapter : public Plugin {
     std::unique_ptr<Impl> impl_;
 };
 
+/// R_map_body of a pose's roll, pitch, yaw, 3 x 3 column-major.
+void rotation_from_rpy(const double* rpy, double* R);
 /// d(right tangent)/d(roll, pitch, yaw), 3 x 3 column-major: body rates of Euler rates.
 void euler_jacobian(double roll, double pitch, double* E);
 
