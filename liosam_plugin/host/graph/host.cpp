@@ -90,8 +90,9 @@ class Host::Impl {
     Pose loop_correction_;  ///< of all loops: T_map_odometry; the inertial graph lives in odometry
     std::optional<Stamp> last_processed_;
     MatchReport report_;
-    int processed_ = 0;  ///< scans since the start
-    int failures_ = 0;   ///< refused matches in a row
+    int processed_ = 0;              ///< scans since the start
+    int failures_ = 0;               ///< refused matches in a row
+    Health health_ = Health::kInit;  ///< of the last scan that was not skipped
     std::size_t resets_ = 0, degenerate_ = 0, lost_ = 0, graph_events_ = 0, loops_closed_ = 0;
     Mat6 covariance_ = Mat6::Zero();  ///< of the last estimate: rotation (body), position (map)
     StopWatch watch_;
@@ -108,6 +109,7 @@ void Host::Impl::begin_epoch() {
     last_processed_.reset();
     processed_ = 0;
     failures_ = 0;
+    health_ = Health::kInit;
 }
 
 std::optional<ScanResult> Host::Impl::step() {
@@ -127,7 +129,6 @@ void Host::Impl::process(MeasureGroup& group, ScanResult& r) {
     if (!predict(group, r)) return;
     if (!due(group)) {
         r.status = ScanStatus::kSkipped;
-        r.health = Health::kOk;
         return;
     }
     last_processed_ = group.begin;
@@ -242,7 +243,7 @@ void Host::Impl::start_map(const MeasureGroup& group, ScanResult& r) {
     predictor_.correct(previous_, loop_correction_.R, imu_graph_.state());
     covariance_ = start_covariance();
     r.has_pose = true;
-    r.health = Health::kOk;
+    health_ = Health::kOk;
     r.status = ScanStatus::kMapInitialised;
     grow_map(group, r);
 }
@@ -291,7 +292,7 @@ void Host::Impl::judge(const MatchReport& report, ScanResult& r) {
     switch (report.status) {
         case MatchStatus::kOk:
             r.status = ScanStatus::kOk;
-            r.health = report.degenerate ? Health::kDegenerate : Health::kOk;
+            health_ = report.degenerate ? Health::kDegenerate : Health::kOk;
             degenerate_ += report.degenerate ? 1 : 0;
             return;
         case MatchStatus::kFewRows:
@@ -302,7 +303,7 @@ void Host::Impl::judge(const MatchReport& report, ScanResult& r) {
             break;
     }
     ++lost_;
-    r.health = Health::kLost;
+    health_ = Health::kLost;
 }
 
 /// Hands the estimate to the inertial graph and takes back what it knows of velocity and biases.
@@ -357,6 +358,7 @@ Mat6 Host::Impl::in_odometry(const Mat6& C) const {
 }
 
 void Host::Impl::finish(ScanResult& r) const {
+    r.health = health_;
     r.map_points = map_.corners().size() + map_.surfaces().size();
     if (!r.has_pose) return;
     r.state = predictor_.state();
