@@ -95,6 +95,7 @@ class Host::Impl {
     Health health_ = Health::kInit;  ///< of the last scan that was not skipped
     std::size_t resets_ = 0, degenerate_ = 0, lost_ = 0, graph_events_ = 0, loops_closed_ = 0;
     Mat6 covariance_ = Mat6::Zero();  ///< of the last estimate: rotation (body), position (map)
+    Mat6 matched_covariance_ = Mat6::Zero();  ///< of the last one that came from a match
     StopWatch watch_;
 };
 
@@ -240,8 +241,8 @@ void Host::Impl::start_map(const MeasureGroup& group, ScanResult& r) {
         say(r, "the inertial graph cannot start from this state: starting anew");
         return;
     }
-    predictor_.correct(previous_, loop_correction_.R, imu_graph_.state());
-    covariance_ = start_covariance();
+    predictor_.correct(previous_, loop_correction_.R, imu_graph_.state(), true);
+    covariance_ = matched_covariance_ = start_covariance();
     r.has_pose = true;
     health_ = Health::kOk;
     r.status = ScanStatus::kMapInitialised;
@@ -278,10 +279,12 @@ Pose Host::Impl::match(ScanResult& r) {
     r.diagnostics.iterations = report_.iterations;
     judge(report_, r);
     if (!enough) r.status = ScanStatus::kTooFewPoints;
-    // Unseen motion adds up; a match ends that.
-    covariance_ = report_.status == MatchStatus::kOk
-                      ? pose_covariance(P, report_.information, config_.matching.variance)
-                      : Mat6(covariance_ + P);
+    if (report_.status == MatchStatus::kOk) {
+        covariance_ = pose_covariance(P, report_.information, config_.matching.variance);
+        matched_covariance_ = covariance_;
+    } else {
+        covariance_ = matched_covariance_ + P;
+    }
     r.times.search = report_.search_ms;
     r.times.update = watch_.lap() - report_.search_ms;
     return estimate;
@@ -321,7 +324,8 @@ void Host::Impl::correct(const Pose& estimate, ScanResult& r) {
         say(r, status == GraphStatus::kReset ? "speed or bias out of bounds: inertial graph reset"
                                              : "inertial graph recovered");
     }
-    predictor_.correct(estimate, loop_correction_.R, imu_graph_.state());
+    predictor_.correct(estimate, loop_correction_.R, imu_graph_.state(),
+                       report_.status == MatchStatus::kOk);
     previous_ = estimate;
 }
 
@@ -334,7 +338,8 @@ void Host::Impl::grow_map(const MeasureGroup& group, ScanResult& r) {
     r.times.map += watch_.lap();
 }
 
-/// Where the newest keyframe closes a loop: all keyframes move, and the estimate with the newest.
+/// Where the newest keyframe closes a loop: all keyframes move, and the estimate with the newest,
+/// which is matched thereby if it was not before.
 void Host::Impl::close_loop(ScanResult& r) {
     const std::optional<Loop> loop = loops_.find(map_);
     if (!loop) return;
@@ -345,7 +350,8 @@ void Host::Impl::close_loop(ScanResult& r) {
     const Pose moved = keyframes_.pose(loop->to) * previous_.inverse();
     loop_correction_ = moved * loop_correction_;
     previous_ = keyframes_.pose(loop->to);
-    predictor_.correct(previous_, loop_correction_.R, imu_graph_.state());
+    predictor_.correct(previous_, loop_correction_.R, imu_graph_.state(), true);
+    matched_covariance_ = covariance_;
     ++loops_closed_;
     say(r, "loop closed with keyframe " + std::to_string(loop->from));
 }

@@ -2,6 +2,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "predictor.hpp"
 
+#include <Eigen/Eigenvalues>
 #include <Eigen/Geometry>
 #include <algorithm>
 
@@ -11,6 +12,8 @@ namespace d2lio::liosam {
 namespace {
 
 using I = StateIndex;
+using G = GraphIndex;
+using Mat9 = Eigen::Matrix<double, 9, 9>;
 
 /// A sensor at rest: spreads of its readings below these (vibration of an idling vehicle passes).
 constexpr double kStillGyro = 0.02;  ///< rad/s
@@ -31,6 +34,14 @@ Mat3 levelled(const Vec3& up) {
     const Mat3 R = Eigen::Quaterniond::FromTwoVectors(up, Vec3::UnitZ()).toRotationMatrix();
     const double yaw = std::atan2(R(1, 0), R(0, 0));
     return Eigen::AngleAxisd(-yaw, Vec3::UnitZ()) * R;
+}
+
+/// A covariance below neither of the two: `a` plus the positive part of b - a.
+Mat9 upper_bound(const Mat9& a, const Mat9& b) {
+    const Eigen::SelfAdjointEigenSolver<Mat9> more(b - a);
+    const Mat9& V = more.eigenvectors();
+    const Mat9 bound = a + V * more.eigenvalues().cwiseMax(0.0).asDiagonal() * V.transpose();
+    return 0.5 * (bound + bound.transpose());
 }
 
 Mat3 rotation_of(const ImuSample& s) {
@@ -106,9 +117,8 @@ void Predictor::advance(const MeasureGroup& group, double noise_scale) {
 /// tilt. Its velocity comes from the matched positions, so it is in the map's axes as it stands
 /// (turning it by the tilt would feed the tilt); gravity is known relative to its own attitude,
 /// g_body = R^T g.
-void Predictor::correct(const Pose& T_map_imu, const Mat3& R_map_odometry,
-                        const GraphState& graph) {
-    using G = GraphIndex;
+void Predictor::correct(const Pose& T_map_imu, const Mat3& R_map_odometry, const GraphState& graph,
+                        bool matched) {
     const Mat3 to_body = graph.T_map_imu.R.transpose();
     x_.pos = T_map_imu.t;
     x_.rot = T_map_imu.R;
@@ -116,15 +126,27 @@ void Predictor::correct(const Pose& T_map_imu, const Mat3& R_map_odometry,
     x_.gravity = T_map_imu.R * to_body * Vec3(0.0, 0.0, -config_.imu.gravity);
     x_.gyro_bias = graph.gyro_bias;
     x_.accel_bias = graph.accel_bias;
-
-    // Velocity and both biases lie side by side in the graph's error as in ours.
-    Eigen::Matrix<double, 9, 9> J = Eigen::Matrix<double, 9, 9>::Identity();
-    J.topLeftCorner<3, 3>() = R_map_odometry;
-    P_.setZero();
-    P_.block<9, 9>(I::kVel, I::kVel) =
-        J * graph.covariance.block<9, 9>(G::kVel, G::kVel) * J.transpose();
-    P_.block<2, 2>(I::kGravity, I::kGravity).diagonal().setConstant(kStartGravity * kStartGravity);
+    correct_covariance(R_map_odometry, graph, matched);
     steps_.clear();
+}
+
+/// A match makes the pose the new reference. A pose that was only predicted keeps its error and
+/// what that shares with velocity, biases and gravity: the same wrong velocity moves it on. What
+/// the graph doubts more than the prediction does is independent of all that, so that the whole
+/// stays positive definite.
+void Predictor::correct_covariance(const Mat3& R_map_odometry, const GraphState& graph,
+                                   bool matched) {
+    // Velocity and both biases lie side by side in the graph's error as in ours.
+    Mat9 J = Mat9::Identity();
+    J.topLeftCorner<3, 3>() = R_map_odometry;
+    const Mat9 motion = J * graph.covariance.block<9, 9>(G::kVel, G::kVel) * J.transpose();
+    if (!matched) {
+        P_.block<9, 9>(I::kVel, I::kVel) = upper_bound(P_.block<9, 9>(I::kVel, I::kVel), motion);
+        return;
+    }
+    P_.setZero();
+    P_.block<9, 9>(I::kVel, I::kVel) = motion;
+    P_.block<2, 2>(I::kGravity, I::kGravity).diagonal().setConstant(kStartGravity * kStartGravity);
 }
 
 Mat6 Predictor::covariance() const {

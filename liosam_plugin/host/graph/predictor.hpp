@@ -12,7 +12,7 @@
 namespace d2lio::liosam {
 
 /// Forward propagation from the last corrected state to the end of a scan: the initial guess, its
-/// covariance relative to the last estimate, and the motion for de-skewing.
+/// covariance relative to the last matched estimate, and the motion for de-skewing.
 class Predictor {
   public:
     explicit Predictor(const HostConfig& config);
@@ -25,12 +25,15 @@ class Predictor {
     /// Moves the state to the group's end. @param noise_scale of the process noise, >= 1.
     void advance(const MeasureGroup& group, double noise_scale);
     /// Takes over an estimate at the present time: pose of the scan matching, everything else from
-    /// the graph. Starts a new horizon.
+    /// the graph. Starts a new horizon of inputs.
     /// @param R_map_odometry turns the graph's axes into the map's: the rotation of all loops.
-    void correct(const Pose& T_map_imu, const Mat3& R_map_odometry, const GraphState& graph);
+    /// @param matched whether the pose was measured; if it is the prediction itself, the pose's
+    /// covariance goes on growing.
+    void correct(const Pose& T_map_imu, const Mat3& R_map_odometry, const GraphState& graph,
+                 bool matched);
 
     const NavState& state() const { return x_; }
-    /// 6x6 of the pose relative to the last estimate: rotation (right, body), position (map).
+    /// 6x6 of the pose relative to the last matched one: rotation (right, body), position (map).
     Mat6 covariance() const;
     bool is_finite() const { return x_.is_finite() && P_.allFinite(); }
     /// Knots of the last advance() for de-skewing, offsets from the scan's begin.
@@ -46,6 +49,7 @@ class Predictor {
 
   private:
     Mat12 noise_over(double dt, double scale) const;
+    void correct_covariance(const Mat3& R_map_odometry, const GraphState& graph, bool matched);
 
     const HostConfig& config_;
     Pose extrinsic_;

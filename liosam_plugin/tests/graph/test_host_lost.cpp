@@ -63,5 +63,41 @@ TEST(LioSamHostLost, HealthBeginsAnewWithTheEpoch) {
     EXPECT_EQ(results[first].health, Health::kInit);
 }
 
+struct AfterLoss {
+    double variance;     ///< of the last lost position, m^2, summed over the axes
+    double information;  ///< of the prior of the first match, m^-2, likewise
+    double later;        ///< of the match after that
+};
+
+AfterLoss after_loss(int lost) {
+    const auto results = lose(Preset::kD2Lio, lost);
+    const auto first = static_cast<std::size_t>(kFirstLost + lost);
+    for (std::size_t i = kFirstLost; i < results.size(); ++i) {
+        EXPECT_EQ(results[i].status == ScanStatus::kOk, i >= first) << "scan " << i;
+    }
+    return {results[first - 1].covariance.topLeftCorner<3, 3>().trace(),
+            results[first].diagnostics.prior_t.sum(), results[first + 1].diagnostics.prior_t.sum()};
+}
+
+TEST(LioSamHostLost, ThePriorRemembersEveryScanThatDidNotMatch) {
+    constexpr double kMostKept = 0.6;   // of the information, where twice as many are lost
+    constexpr double kLeastBack = 0.5;  // of a prior that follows a match, one match after the loss
+    const double unbroken = after_loss(0).information;
+    double last = unbroken;
+    for (const int lost : {1, 2, 4, 8, 16}) {
+        const AfterLoss after = after_loss(lost);
+        EXPECT_LT(after.information, kMostKept * last) << lost << " lost";
+        EXPECT_GT(after.later, kLeastBack * unbroken) << lost << " lost";
+        last = after.information;
+    }
+}
+
+TEST(LioSamHostLost, PositionErrorGrowsAtLeastWithTheTimeLost) {
+    // The unknown velocity is the same in every lost scan: standard deviations add up, not
+    // variances.
+    constexpr int kLost = 16;
+    EXPECT_GT(after_loss(kLost).variance, kLost * kLost * after_loss(1).variance);
+}
+
 }  // namespace
 }  // namespace d2lio::liosam
