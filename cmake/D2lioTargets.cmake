@@ -28,6 +28,23 @@ function(d2lio_tests name library folder)
   add_test(NAME ${name} COMMAND ${name})
 endfunction()
 
+# d2lio_glue_tests(<host>): what a patched upstream includes, against stand-ins for either ROS.
+function(d2lio_glue_tests host)
+  foreach(ros 1 2)
+    set(deps d2lio_${host}_glue_ros${ros})
+    add_library(${deps} INTERFACE)
+    target_link_libraries(${deps} INTERFACE d2lio::${host}_adapter)
+    target_compile_definitions(${deps} INTERFACE D2LIO_ROS=${ros} D2LIO_WITH_DIAGNOSTIC_MSGS)
+    target_include_directories(${deps} INTERFACE ${CMAKE_CURRENT_SOURCE_DIR}/ros/include
+                               ${PROJECT_SOURCE_DIR}/common/ros/include
+                               ${PROJECT_SOURCE_DIR}/common/tests/ros
+                               ${PROJECT_SOURCE_DIR}/common/tests/ros/ros${ros})
+    d2lio_tests(test_${host}_glue_ros${ros} ${deps} ${CMAKE_CURRENT_SOURCE_DIR}/tests/ros)
+    d2lio_headers_alone(${host}_glue_ros${ros}_alone ${deps}
+                        ${CMAKE_CURRENT_SOURCE_DIR}/ros/include 14)
+  endforeach()
+endfunction()
+
 # d2lio_bench(<name> <library> <folder>): one Google Benchmark binary from <folder>/bench_*.cpp.
 function(d2lio_bench name library folder)
   file(GLOB sources CONFIGURE_DEPENDS ${folder}/bench_*.cpp)

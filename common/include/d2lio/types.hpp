@@ -18,6 +18,8 @@ inline double seconds_between(Stamp a, Stamp b) { return static_cast<double>(a -
 
 using Vec3 = Eigen::Vector3d;
 using Mat3 = Eigen::Matrix3d;
+using Vec6 = Eigen::Matrix<double, 6, 1>;
+using Mat6 = Eigen::Matrix<double, 6, 6>;
 
 /// Rigid transform T_a_b: maps a point in frame b to frame a, p_a = R p_b + t.
 struct Pose {
