@@ -4,8 +4,8 @@
 
 import sys
 
-if sys.version_info < (3, 11):  # noqa: UP036 (any Python may start this)
-    sys.exit("d2lio patch: needs Python 3.11 or newer; name one with D2LIO_PYTHON=PATH")
+if sys.version_info < (3, 8):  # noqa: UP036 (any Python may start this)
+    sys.exit("d2lio patch: needs Python 3.8 or newer; name one with D2LIO_PYTHON=PATH")
 
 from d2lio_patch.cli import main
 

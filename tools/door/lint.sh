@@ -29,6 +29,7 @@ cmd_lint() {
     check 'ruff check' "$bin/ruff" check --quiet .
     check 'ruff format' "$bin/ruff" format --quiet --check .
     check codespell "$bin/codespell"
+    check 'vermin (Python 3.8 for the patch tool)' "$bin/vermin" --quiet --no-tips -t=3.8- patches/tool
     if command -v shellcheck >/dev/null; then
         check shellcheck shellcheck -x -a d2lio tools/door/build_gtsam.sh .ci/run
     else

@@ -242,4 +242,4 @@ def test_front_door_needs_no_set_up(door: Door, tmp_path: Path) -> None:
 def test_front_door_names_a_python_that_is_too_old(door: Door) -> None:
     done = door.run("patch", "x", FAKE_VERSION="old")
     assert done.returncode == 10
-    assert "older than Python 3.11" in done.stderr
+    assert "older than Python 3.8" in done.stderr

@@ -36,12 +36,24 @@ std::string trim(const std::string& s) {
     return first < last ? std::string(first, last) : std::string();
 }
 
+/// The same in every locale, and with GCC 9, whose from_chars knows integers only.
+bool read_number(const std::string& s, double& out) {
+    std::string lower = s;
+    for (char& c : lower) c = static_cast<char>(std::tolower(static_cast<unsigned char>(c)));
+    if (lower == "inf" || lower == "infinity") {
+        out = kInf;
+        return true;
+    }
+    std::istringstream in(s);
+    in.imbue(std::locale::classic());
+    in >> out;
+    return !in.fail() && in.peek() == std::istringstream::traits_type::eof();
+}
+
 /// Parses one number that fills the whole text; infinity only where the range is open there.
 double parse_number(const std::string& key, const std::string& text, const Range& range) {
-    const std::string s = trim(text);
-    double v = 0.0;  // from_chars: the same in every locale
-    const auto [end, fault] = std::from_chars(s.data(), s.data() + s.size(), v);
-    const bool whole = fault == std::errc() && end == s.data() + s.size() && !s.empty();
+    double v = 0.0;
+    const bool whole = read_number(trim(text), v);
     const bool open_end = std::isinf(v) && v > 0 && range.max == kInf;
     if (!whole || std::isnan(v) || (std::isinf(v) && !open_end) || v < range.min || v > range.max) {
         throw ConfigError(key, text, "a number, " + format_range(range));

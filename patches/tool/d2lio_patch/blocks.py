@@ -64,7 +64,7 @@ def strip(text: str) -> str:
     """
     parts, at = [], 0
     markers = list(_MARKER.finditer(text))
-    for begin, end in zip(markers[::2], markers[1::2], strict=False):
+    for begin, end in zip(markers[::2], markers[1::2]):
         if (begin[1], end[1]) != ("begin", "end") or begin[2] != end[2]:
             raise MarkerError(f"the lines around 'd2lio:{begin[1]} {begin[2]}' were edited")
         first, last = begin.start(), end.end()

@@ -26,7 +26,7 @@ def refuse_dirty(root: Path, files: list[FilePlan], state: dict | None) -> None:
     paths = [str(file.target.relative_to(root)) for file in files]
     differs = compare_with_commit(root, paths)
     problems = []
-    for file, path in zip(files, paths, strict=True):
+    for file, path in zip(files, paths):
         reason = _edited(file, record.get(file.path), differs.get(path))
         if reason:
             problems.append(f"{file.path}: {reason}")

@@ -1,11 +1,11 @@
 # SPDX-FileCopyrightText: 2026 D2-LIO contributors
 # SPDX-License-Identifier: BSD-3-Clause
-"""Hook sets: which of our lines go where, read from ``patches/<host>/*.toml``."""
+"""Hook sets: which of our lines go where, read from ``patches/<host>/*.ini``."""
 
 from __future__ import annotations
 
+import configparser
 import re
-import tomllib
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -13,7 +13,7 @@ PATCHES = Path(__file__).resolve().parents[2]
 FLAVOURS = ("ros1", "ros2")
 POSITIONS = ("after-line", "after-statement", "before-statement")
 
-_KEYS = {"name", "files", "anchor", "position", "fragment", "what", "why", "test"}
+_KEYS = {"files", "anchor", "position", "fragment", "what", "why", "test"}
 _OPTIONAL = {"when", "unless", "flavours"}
 
 
@@ -52,7 +52,7 @@ class Hook:
 
 @dataclass(frozen=True)
 class HookSet:
-    """The hooks of one TOML file, in the order in which they are listed."""
+    """The hooks of one file, in the order in which they are listed."""
 
     name: str
     hooks: tuple[Hook, ...]
@@ -92,33 +92,35 @@ def load_set(host: str, name: str = "hooks", root: Path = PATCHES) -> HookSet | 
     Raises:
         ValueError: the set is not well formed.
     """
-    path = root / host / f"{name}.toml"
+    path = root / host / f"{name}.ini"
     if not path.exists():
         return None
-    data = tomllib.loads(path.read_text(encoding="utf-8"))
-    hooks = tuple(_read_hook(path, entry) for entry in data["hook"])
-    names = [hook.name for hook in hooks]
-    if len(set(names)) != len(names):
-        raise ValueError(f"{path}: two hooks have the same name")
-    return HookSet(name, hooks)
+    parser = configparser.ConfigParser(
+        delimiters=("=",), comment_prefixes=("#",), interpolation=None, default_section=""
+    )
+    try:
+        parser.read_string(path.read_text(encoding="utf-8"), path.name)
+    except configparser.Error as error:
+        raise ValueError(f"{host}: {error}") from error
+    return HookSet(name, tuple(_read_hook(path, n, dict(parser[n])) for n in parser.sections()))
 
 
-def _read_hook(path: Path, entry: dict) -> Hook:
+def _read_hook(path: Path, name: str, entry: dict[str, str]) -> Hook:
     folder = path.parent
-    name = entry.get("name", "?")
+    flavours = tuple(entry.get("flavours", " ".join(FLAVOURS)).split())
+    if entry.get("position") not in POSITIONS or not set(flavours) <= set(FLAVOURS):
+        raise ValueError(f"{folder.name}, hook {name}: unknown position or flavour")
+    by_flavour = {f: entry.pop(f"fragment.{f}", entry.get("fragment", "")) for f in flavours}
+    if all(by_flavour.values()):
+        entry.setdefault("fragment", "")
     if not _KEYS <= set(entry) <= _KEYS | _OPTIONAL:
         odd = sorted(set(entry) ^ _KEYS - _OPTIONAL)
         raise ValueError(f"{folder.name}, hook {name}: keys missing or unknown: {', '.join(odd)}")
-    flavours = tuple(entry.get("flavours", FLAVOURS))
-    if entry["position"] not in POSITIONS or not set(flavours) <= set(FLAVOURS):
-        raise ValueError(f"{folder.name}, hook {name}: unknown position or flavour")
-    fragment = entry["fragment"]
-    by_flavour = fragment if isinstance(fragment, dict) else dict.fromkeys(flavours, fragment)
     return Hook(
         set_name=path.stem,
         name=name,
-        files=_words(entry["files"]),
-        anchors=_words(entry["anchor"]),
+        files=tuple(entry["files"].split()),
+        anchors=tuple(filter(None, entry["anchor"].splitlines())),
         position=entry["position"],
         fragments={
             f: (folder / "fragments" / by_flavour[f]).read_text("latin-1") for f in flavours
@@ -130,7 +132,3 @@ def _read_hook(path: Path, entry: dict) -> Hook:
         unless=entry.get("unless", ""),
         flavours=flavours,
     )
-
-
-def _words(value: str | list[str]) -> tuple[str, ...]:
-    return (value,) if isinstance(value, str) else tuple(value)

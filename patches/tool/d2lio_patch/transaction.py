@@ -101,7 +101,7 @@ class Transaction:
         return entries
 
     def _prepare(self, files: list[FilePlan], entries: list[Entry], state: dict | None) -> None:
-        for file, entry in zip(files, entries, strict=True):
+        for file, entry in zip(files, entries):
             _write(self.root / entry.temp, file.wanted, like=file.target)
             _link(file.target, self.root / entry.backup)
         if state is not None:
