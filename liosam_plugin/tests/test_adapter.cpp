@@ -17,9 +17,6 @@
 namespace d2lio::liosam {
 namespace {
 
-using Mat6 = Eigen::Matrix<double, 6, 6>;
-using Vec6 = Eigen::Matrix<double, 6, 1>;
-
 constexpr double kVariance = 1e-3;
 constexpr double kExact = 1e-9;
 constexpr double kNumeric = 1e-6;  ///< of central differences

@@ -76,7 +76,7 @@ struct Matching {
         Adapter adapter;
         for (const auto& [key, value] : params)
             EXPECT_TRUE(adapter.set(key.c_str(), value.c_str()));
-        Eigen::Matrix<double, 6, 6> P = Eigen::Matrix<double, 6, 6>::Identity() * 1e-6;
+        Mat6 P = Mat6::Identity() * 1e-6;
         const Pose previous = guess;
         adapter.begin_scan({{previous.R.data(), previous.t.data()},
                             {guess.R.data(), guess.t.data()},

@@ -59,10 +59,10 @@ bool is_within(const Vec3& v, double bound) { return v.allFinite() && v.norm() <
 
 /// `covariance` made symmetric with eigenvalues in [kMinVariance, kMaxVariance]; `repaired` tells
 /// whether it needed that.
-Mat6x6 sane_covariance(const Mat6x6& covariance, bool& repaired) {
+Mat6 sane_covariance(const Mat6& covariance, bool& repaired) {
     repaired = true;
-    if (!covariance.allFinite()) return Mat6x6::Identity();
-    Mat6x6 P = 0.5 * (covariance + covariance.transpose());
+    if (!covariance.allFinite()) return Mat6::Identity();
+    Mat6 P = 0.5 * (covariance + covariance.transpose());
     const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> solver{Eigen::MatrixXd(P)};
     const Eigen::VectorXd& values = solver.eigenvalues();
     if (values.minCoeff() >= kMinVariance && values.maxCoeff() <= kMaxVariance) {
@@ -114,7 +114,7 @@ class ImuGraph::Impl {
                        GraphStatus::kOk);
     }
 
-    GraphStatus correct(const Pose& measured, const Mat6x6& covariance,
+    GraphStatus correct(const Pose& measured, const Mat6& covariance,
                         const std::vector<ImuStep>& steps) {
         if (!started_) return GraphStatus::kRejected;
         const Measurement m = check_measurement(measured, covariance);
@@ -144,10 +144,10 @@ class ImuGraph::Impl {
   private:
     struct Measurement {
         std::optional<gtsam::Pose3> pose;
-        Mat6x6 covariance;
+        Mat6 covariance;
     };
 
-    Measurement check_measurement(const Pose& measured, const Mat6x6& covariance) {
+    Measurement check_measurement(const Pose& measured, const Mat6& covariance) {
         bool repaired = false;
         Measurement m{std::nullopt, sane_covariance(covariance, repaired)};
         if (repaired) ++counts_.bad_covariances;
@@ -320,7 +320,7 @@ GraphStatus ImuGraph::start(const Pose& T_map_imu, const Vec3& vel, const Vec3& 
                             const Vec3& accel_bias) {
     return impl_->start(T_map_imu, vel, gyro_bias, accel_bias);
 }
-GraphStatus ImuGraph::correct(const Pose& measured, const Mat6x6& covariance,
+GraphStatus ImuGraph::correct(const Pose& measured, const Mat6& covariance,
                               const std::vector<ImuStep>& steps) {
     return impl_->correct(measured, covariance, steps);
 }

@@ -13,7 +13,7 @@
 
 namespace d2lio::liosam {
 
-using Mat6x6 = Eigen::Matrix<double, 6, 6>;
+using Mat6x6 = Mat6;
 using Mat15x15 = Eigen::Matrix<double, 15, 15>;
 
 /// Noise, priors and bounds; the defaults are LIO-SAM's. All but reset_keys are at least 1e-9.
@@ -95,7 +95,7 @@ class ImuGraph {
     /// @param covariance 6x6 of its error: rotation (right, body axes, rad^2), position (map, m^2)
     /// @param steps in order, covering the time since the last correction exactly; empty ones
     ///        (dt = 0) are allowed
-    GraphStatus correct(const Pose& measured, const Mat6x6& covariance,
+    GraphStatus correct(const Pose& measured, const Mat6& covariance,
                         const std::vector<ImuStep>& steps);
 
     const GraphState& state() const;

@@ -116,7 +116,7 @@ gtsam::NonlinearFactor::shared_ptr StatePrior::clone() const {
 }
 
 PoseMeasurement::PoseMeasurement(gtsam::Key key, const gtsam::Pose3& measured,
-                                 const Mat6x6& covariance)
+                                 const Mat6& covariance)
     : NoiseModelFactorN(joint_noise(covariance), key), measured_(measured) {}
 
 gtsam::Vector PoseMeasurement::evaluateError(const gtsam::Pose3& pose,

@@ -56,7 +56,7 @@ class StatePrior
 class PoseMeasurement : public gtsam::NoiseModelFactorN<gtsam::Pose3> {
   public:
     /// @param covariance 6x6 of the error @throws std::invalid_argument if not positive definite
-    PoseMeasurement(gtsam::Key key, const gtsam::Pose3& measured, const Mat6x6& covariance);
+    PoseMeasurement(gtsam::Key key, const gtsam::Pose3& measured, const Mat6& covariance);
 
     gtsam::Vector evaluateError(const gtsam::Pose3& pose,
                                 boost::optional<gtsam::Matrix&> H = boost::none) const override;

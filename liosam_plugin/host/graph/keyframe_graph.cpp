@@ -120,8 +120,8 @@ class KeyframeGraph::Impl {
         return GraphStatus::kOk;
     }
 
-    Eigen::Matrix<double, 6, 6> covariance() {
-        if (poses_.empty()) return Eigen::Matrix<double, 6, 6>::Zero();
+    Mat6 covariance() {
+        if (poses_.empty()) return Mat6::Zero();
         const gtsam::Matrix6 J = map_axes(poses_.back().R);
         const gtsam::Matrix6 P = J * marginal() * J.transpose();
         return 0.5 * (P + P.transpose());
@@ -301,7 +301,7 @@ const Pose& KeyframeGraph::pose(std::size_t i) const { return impl_->poses_.at(i
 std::size_t KeyframeGraph::size() const { return impl_->poses_.size(); }
 std::size_t KeyframeGraph::first_active() const { return impl_->base_; }
 bool KeyframeGraph::moved() { return std::exchange(impl_->moved_, false); }
-Eigen::Matrix<double, 6, 6> KeyframeGraph::covariance() const { return impl_->covariance(); }
+Mat6 KeyframeGraph::covariance() const { return impl_->covariance(); }
 void KeyframeGraph::clear() { impl_->clear(); }
 const KeyframeGraphCounts& KeyframeGraph::counts() const { return impl_->counts_; }
 

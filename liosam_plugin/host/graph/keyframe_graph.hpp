@@ -65,7 +65,7 @@ class KeyframeGraph {
     bool moved();
     /// 6x6 of the newest keyframe's error: rotation (right, body axes, rad^2), position (map, m^2).
     /// Zero without keyframes. Absolute, hence dominated by the first pose's prior.
-    Eigen::Matrix<double, 6, 6> covariance() const;
+    Mat6 covariance() const;
     /// Forgets all keyframes; counts stay.
     void clear();
     const KeyframeGraphCounts& counts() const;

@@ -91,7 +91,7 @@ std::optional<Loop> LoopCloser::find(const KeyframeMap& map) {
     if (target_.size() < kMinTarget || source.size() < kMinSource) return std::nullopt;
 
     Pose T = map[*old].pose.inverse() * map.back().pose;
-    const Eigen::Matrix<double, 6, 6> P = kNoInformation * Eigen::Matrix<double, 6, 6>::Identity();
+    const Mat6 P = kNoInformation * Mat6::Identity();
     const PoseView guess{T.R.data(), T.t.data()};
     adapter_.begin_scan({guess, guess, P.data(), 0, source.size()});
     const MatchReport report = matcher_.align({{}, source, no_corners_, target_}, T);

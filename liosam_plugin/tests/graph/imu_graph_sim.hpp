@@ -13,7 +13,6 @@
 namespace d2lio::liosam::test {
 
 using Vec15 = Eigen::Matrix<double, 15, 1>;
-using Vec6 = Eigen::Matrix<double, 6, 1>;
 
 /// What is true at one instant.
 struct Truth {
@@ -44,8 +43,8 @@ class ImuSim {
     }
 
     /// The true pose with an error drawn from `covariance` (rotation body, position map).
-    Pose measure(const Mat6x6& covariance) {
-        const Mat6x6 L = covariance.llt().matrixL();
+    Pose measure(const Mat6& covariance) {
+        const Mat6 L = covariance.llt().matrixL();
         const Vec6 e = L * Vec6::NullaryExpr([this] { return normal(); });
         return {truth.pose.R * exp_so3(e.head<3>()), truth.pose.t + e.tail<3>()};
     }
@@ -91,10 +90,10 @@ class ImuSim {
 };
 
 /// Covariance of a matcher that sees little along the map's x axis and about the body's z axis.
-inline Mat6x6 matcher_covariance() {
+inline Mat6 matcher_covariance() {
     Vec6 sigma;
     sigma << 0.002, 0.003, 0.02, 0.2, 0.01, 0.02;
-    Mat6x6 P = sigma.cwiseAbs2().asDiagonal();
+    Mat6 P = sigma.cwiseAbs2().asDiagonal();
     P(3, 5) = P(5, 3) = 0.3 * sigma[3] * sigma[5];
     P(2, 4) = P(4, 2) = 0.4 * sigma[2] * sigma[4];
     return P;

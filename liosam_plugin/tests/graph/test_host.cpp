@@ -83,7 +83,7 @@ TEST(LioSamHost, CovarianceIsSymmetricPositiveDefinite) {
     for (const auto& r : test::run(Preset::kD2Lio)) {
         if (!r.has_pose) continue;
         EXPECT_LT((r.covariance - r.covariance.transpose()).norm(), 1e-15);
-        const Eigen::SelfAdjointEigenSolver<Eigen::Matrix<double, 6, 6>> s(r.covariance);
+        const Eigen::SelfAdjointEigenSolver<Mat6> s(r.covariance);
         EXPECT_GT(s.eigenvalues()[0], 0.0);
     }
 }

@@ -26,7 +26,7 @@ ImuGraphOptions biased_options() {
 struct Drive {
     explicit Drive(unsigned seed, const ImuGraphOptions& options = biased_options())
         : sim(seed, options), graph(options) {
-        Mat6x6 prior = Mat6x6::Identity() * options.prior_pose_sigma * options.prior_pose_sigma;
+        Mat6 prior = Mat6::Identity() * options.prior_pose_sigma * options.prior_pose_sigma;
         graph.start(sim.measure(prior), Vec3::Zero(), Vec3::Zero(), Vec3::Zero());
     }
     GraphStatus scan() {

@@ -48,7 +48,7 @@ class ImuGraphFaults : public ::testing::Test {
     ImuGraphOptions options;
     ImuSim sim;
     ImuGraph graph;
-    const Mat6x6 P = matcher_covariance();
+    const Mat6 P = matcher_covariance();
 };
 
 TEST_F(ImuGraphFaults, NothingIsDoneBeforeTheStart) {
@@ -100,13 +100,13 @@ TEST_F(ImuGraphFaults, PoseThatIsNoPoseLeavesAPrediction) {
 }
 
 TEST_F(ImuGraphFaults, CovarianceThatIsNoneIsRepaired) {
-    Mat6x6 negative = P;
+    Mat6 negative = P;
     negative(3, 3) = -1.0;
-    Mat6x6 asymmetric = P;
+    Mat6 asymmetric = P;
     asymmetric(0, 1) = 1.0;
-    const Mat6x6 huge = Mat6x6::Identity() * 1e300;
-    for (const Mat6x6& C :
-         {Mat6x6(Mat6x6::Constant(kNaN)), Mat6x6(Mat6x6::Zero()), negative, asymmetric, huge}) {
+    const Mat6 huge = Mat6::Identity() * 1e300;
+    for (const Mat6& C :
+         {Mat6(Mat6::Constant(kNaN)), Mat6(Mat6::Zero()), negative, asymmetric, huge}) {
         const auto steps = sim.advance(kSteps, kDt);
         EXPECT_NE(graph.correct(sim.truth.pose, C, steps), GraphStatus::kRejected);
         EXPECT_TRUE(is_finite(graph.state()));
@@ -205,7 +205,7 @@ TEST_F(ImuGraphFaults, JumpOfThePoseResets) {
     Pose far = sim.truth.pose;
     far.t.x() += 1000.0;
     const auto steps = sim.advance(kSteps, kDt);
-    const Mat6x6 sure = Mat6x6::Identity() * 1e-6;
+    const Mat6 sure = Mat6::Identity() * 1e-6;
     EXPECT_EQ(graph.correct(far, sure, steps), GraphStatus::kReset);
     EXPECT_EQ(graph.counts().speed_resets, 1u);
     EXPECT_EQ(graph.state().T_map_imu.t, far.t);
@@ -223,7 +223,7 @@ TEST_F(ImuGraphFaults, HalfATurnOfThePoseResets) {
 
 // What the matcher does not claim to know is no contradiction.
 TEST_F(ImuGraphFaults, LargeResidualWithinItsCovarianceIsNoJump) {
-    Mat6x6 blind = P;
+    Mat6 blind = P;
     blind.row(3).setZero();
     blind.col(3).setZero();
     blind(3, 3) = 1e4;
@@ -253,7 +253,7 @@ TEST_F(ImuGraphFaults, BiasBeyondItsBoundResets) {
 
 // Two matched poses of enormous weight against each other, step after step.
 TEST_F(ImuGraphFaults, ContradictoryCertaintiesNeverLeaveTheGraphUnusable) {
-    const Mat6x6 certain = Mat6x6::Identity() * 1e-30;
+    const Mat6 certain = Mat6::Identity() * 1e-30;
     for (int i = 0; i < 50; ++i) {
         const auto steps = sim.advance(kSteps, kDt);
         Pose pose = sim.truth.pose;

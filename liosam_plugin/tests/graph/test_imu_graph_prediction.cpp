@@ -18,7 +18,7 @@ constexpr double kDt = 0.001;  // s; the propagation is an Euler scheme
 constexpr int kSteps = 100;
 
 /// A matched pose that says nothing.
-const Mat6x6 kBlind = Mat6x6::Identity() * 1e12;
+const Mat6 kBlind = Mat6::Identity() * 1e12;
 
 /// The 15 error states that both describe, as indices into the propagation's 23.
 std::array<int, Index::kSize> to_nav() {

@@ -67,9 +67,8 @@ TEST(KeyframeGraphBounded, FullGraphGoesOnWithItsCovarianceAndFreezesTheRest) {
     EXPECT_EQ(bounded.counts().restarts, 4u);
     EXPECT_EQ(bounded.first_active(), 36u);
     const auto P = whole.covariance();
-    const Eigen::Matrix<double, 6, 1> scale = P.diagonal().cwiseSqrt().cwiseInverse();
-    const Eigen::Matrix<double, 6, 6> difference =
-        scale.asDiagonal() * (bounded.covariance() - P) * scale.asDiagonal();
+    const Vec6 scale = P.diagonal().cwiseSqrt().cwiseInverse();
+    const Mat6 difference = scale.asDiagonal() * (bounded.covariance() - P) * scale.asDiagonal();
     constexpr double kTolerance = 1e-6;  // of the product of two sigmas
     EXPECT_LT(difference.cwiseAbs().maxCoeff(), kTolerance);
 }
