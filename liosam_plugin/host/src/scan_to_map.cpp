@@ -25,19 +25,19 @@ constexpr float kInfinity = std::numeric_limits<float>::infinity();
 constexpr double kDegree = 57.29577951308232;
 constexpr double kCentimetre = 100.0;
 
-}  // namespace
-
-ScanToMap::ScanToMap(Adapter& adapter, const MatchOptions& options, int threads)
-    : adapter_(adapter), options_(options), loop_(threads) {}
-
 /// The weight a correspondence gets from its distance alone; LIO-SAM's s or the square root of the
 /// Cauchy kernel's weight (rows are multiplied by it, so the cost sees its square).
-static double weight_of(const MatchOptions& o, Feature feature, double distance, double range) {
+double weight_of(const MatchOptions& o, Feature feature, double distance, double range) {
     const double d = std::abs(distance);
     if (o.kernel_scale > 0.0) return 1.0 / std::sqrt(1.0 + std::pow(d / o.kernel_scale, 2));
     if (feature == Feature::kCorner) return 1.0 - kWeightSlope * d;
     return 1.0 - kWeightSlope * d / std::sqrt(range);
 }
+
+}  // namespace
+
+ScanToMap::ScanToMap(Adapter& adapter, const MatchOptions& options, int threads)
+    : adapter_(adapter), options_(options), loop_(threads) {}
 
 /// Nearest map points. By the triangle inequality the neighbours of the last search still lie
 /// within its reach plus the query's motion, so bounding the search there changes nothing but its
@@ -53,45 +53,49 @@ void ScanToMap::search(const Eigen::Vector3f& query, const IkdTree& map, Memory&
     memory.reach = near.count == kNeighbours ? std::sqrt(near[kNeighbours - 1].sq_dist) : kInfinity;
 }
 
+/// Whether the adapter lets the feature go on to a fit.
+bool ScanToMap::admit(Feature feature, std::size_t index, double range, const Neighbours& near,
+                      const IkdTree& map) {
+    float sq[kNeighbours];
+    for (int i = 0; i < kNeighbours; ++i) sq[i] = i < near.count ? near[i].sq_dist : kInfinity;
+    const bool cut_off = bounded_search_ && map.size() >= kNeighbours;  // the others are beyond
+    const Candidate candidate{feature, index, range, sq, 1, cut_off ? kNeighbours : near.count};
+    return adapter_.gate(candidate) < kGate;
+}
+
+/// Line or plane through the neighbours; false where they have none.
+bool ScanToMap::fit(Feature feature, std::size_t index, const Neighbours& near,
+                    const Eigen::Vector3f& q, Match& m) {
+    const float* const xyz = &near.items[0].x;
+    constexpr int kStride = sizeof(Neighbour) / sizeof(float);
+    if (feature == Feature::kCorner) {
+        Line line;
+        if (!fit_line(xyz, kStride, kNeighbours, line)) return false;
+        m.normal = line.away_from(q);
+        m.distance = static_cast<double>(m.normal.dot(q - line.point));
+        return true;
+    }
+    Plane plane;
+    PlaneFitOptions options;
+    options.max_distance = kPlaneDistance;
+    const PlaneStatus status = fit_plane(xyz, kStride, kNeighbours, options, plane);
+    if (status == PlaneStatus::kSingular) adapter_.mark_singular(feature, index);
+    if (status != PlaneStatus::kOk) return false;
+    m.normal = plane.normal;
+    m.distance = static_cast<double>(plane.signed_distance(q));
+    return true;
+}
+
 ScanToMap::Row ScanToMap::match(Feature feature, std::size_t index, const Eigen::Vector3f& p_imu,
                                 const IkdTree& map, const Pose& T, Memory& memory) {
     Row row{Vec6::Zero(), 0.0, false};
     const Vec3 p = p_imu.cast<double>();
     const Eigen::Vector3f q = (T * p).cast<float>();
+    const double range = p.norm();
     Neighbours near;
     search(q, map, memory, near);
-
-    float sq[kNeighbours];
-    for (int i = 0; i < kNeighbours; ++i) sq[i] = i < near.count ? near[i].sq_dist : kInfinity;
-    const bool cut_off = bounded_search_ && map.size() >= kNeighbours;  // the others are beyond
-    const double range = p.norm();
-    const Candidate candidate{feature, index, range, sq, 1, cut_off ? kNeighbours : near.count};
-    if (!(adapter_.gate(candidate) < kGate)) return row;
-
     Match m{Eigen::Vector3f::Zero(), 0.0};
-    const float* const xyz = &near.items[0].x;
-    constexpr int kStride = sizeof(Neighbour) / sizeof(float);
-    if (feature == Feature::kCorner) {
-        Line line;
-        if (!fit_line(xyz, kStride, kNeighbours, line)) return row;
-        m.normal = line.away_from(q);
-        m.distance = static_cast<double>(m.normal.dot(q - line.point));
-    } else {
-        Plane plane;
-        PlaneFitOptions fit;
-        fit.max_distance = kPlaneDistance;
-        switch (fit_plane(xyz, kStride, kNeighbours, fit, plane)) {
-            case PlaneStatus::kSingular:
-                adapter_.mark_singular(feature, index);
-                return row;
-            case PlaneStatus::kRough:
-                return row;
-            case PlaneStatus::kOk:
-                break;
-        }
-        m.normal = plane.normal;
-        m.distance = static_cast<double>(plane.signed_distance(q));
-    }
+    if (!admit(feature, index, range, near, map) || !fit(feature, index, near, q, m)) return row;
     const double weight =
         adapter_.weigh(feature, index, weight_of(options_, feature, m.distance, range));
     if (!(weight > 0.0)) return row;

@@ -11,9 +11,6 @@
 
 namespace d2lio::liosam {
 
-using Mat6 = Eigen::Matrix<double, 6, 6>;
-using Vec6 = Eigen::Matrix<double, 6, 1>;
-
 struct MatchOptions {
     int max_iterations = 30;
     double rotation_epsilon = 0.05;     ///< deg, a smaller step ends the iterations
@@ -81,6 +78,10 @@ class ScanToMap {
 
     void search(const Eigen::Vector3f& query, const IkdTree& map, Memory& memory,
                 Neighbours& near) const;
+    bool admit(Feature feature, std::size_t index, double range, const Neighbours& near,
+               const IkdTree& map);
+    bool fit(Feature feature, std::size_t index, const Neighbours& near,
+             const Eigen::Vector3f& query, Match& match);
     Row match(Feature feature, std::size_t index, const Eigen::Vector3f& p, const IkdTree& map,
               const Pose& T, Memory& memory);
     int linearise(const MatchInput& input, const Pose& T, Mat6& AtA, Vec6& Atb);
