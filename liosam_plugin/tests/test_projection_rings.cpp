@@ -7,7 +7,6 @@
 #include <limits>
 #include <random>
 
-#include "d2lio/config/params.hpp"
 #include "projection_rings.hpp"
 #include "scan_patterns.hpp"
 
@@ -62,41 +61,6 @@ TEST(HasRings, IsFalseWhereAllIndicesAreZero) {
     EXPECT_FALSE(has_rings({}));
     EXPECT_FALSE(has_rings({at(0, 0, 0), at(1, 0, 0)}));
     EXPECT_TRUE(has_rings({at(0, 0, 0), at(1, 0, 3)}));
-}
-
-TEST(RingsByElevation, RecoversTheRingsOfAnEvenlySpacedSensor) {
-    const SpinningSensor sensor{32, 360, -25.0 * kDegree, 15.0 * kDegree};
-    const Points truth = scan_of(sensor, room({30, 20, 5}), 0.02);
-    Points points = without_rings(truth);
-    assign_rings_by_elevation(points, {32, sensor.lowest, sensor.highest});
-    EXPECT_EQ(rings_of(points), rings_of(truth));
-}
-
-TEST(RingsByElevation, TakesTheNearestRingWithinHalfAStep) {
-    Points points{at(0, -15.9, 7),  at(0, -15.1, 7),  at(90, 0.9, 7),  at(90, 1.1, 7),
-                  at(180, 15.9, 7), at(180, 16.1, 7), at(0, -16.1, 7), at(0, 90, 7)};
-    points.push_back(points[0]);
-    points.back().y = kNan;
-    points.push_back(points[0]);
-    points.back().x = std::numeric_limits<float>::infinity();  // level, were it a point
-    assign_rings_by_elevation(points, {16, -15.0 * kDegree, 15.0 * kDegree});
-    EXPECT_EQ(rings_of(points), (std::vector<std::uint16_t>{0, 0, 8, 8, 15, kNoRing, kNoRing,
-                                                            kNoRing, kNoRing, kNoRing}));
-}
-
-TEST(RingsByElevation, OneRingTakesAll) {
-    Points points{at(0, -50, 7), at(10, 80, 7)};
-    assign_rings_by_elevation(points, {1, -0.1, 0.1});
-    EXPECT_EQ(rings_of(points), (std::vector<std::uint16_t>{0, 0}));
-}
-
-TEST(RingsByElevation, RefusesAnImpossibleSensor) {
-    Points points;
-    EXPECT_THROW(assign_rings_by_elevation(points, {0, -0.1, 0.1}), ConfigError);
-    EXPECT_THROW(assign_rings_by_elevation(points, {1025, -0.1, 0.1}), ConfigError);
-    EXPECT_THROW(assign_rings_by_elevation(points, {16, 0.1, 0.1}), ConfigError);
-    EXPECT_THROW(assign_rings_by_elevation(points, {16, -kInf, 0.1}), ConfigError);
-    EXPECT_THROW(assign_rings_by_elevation(points, {16, std::nan(""), 0.1}), ConfigError);
 }
 
 TEST(RingsByTurns, RecoversRingsThatFollowOneAnother) {

@@ -6,12 +6,8 @@
 #include <cmath>
 #include <cstddef>
 
-#include "d2lio/config/params.hpp"
-
 namespace d2lio::liosam {
 namespace {
-
-constexpr int kMostRings = 1024;
 
 bool is_finite(const LidarPoint& p) {
     return std::isfinite(p.x) && std::isfinite(p.y) && std::isfinite(p.z);
@@ -47,27 +43,6 @@ float sense_of_rotation(const std::vector<LidarPoint>& points) {
 bool has_rings(const std::vector<LidarPoint>& points) {
     return std::any_of(points.begin(), points.end(),
                        [](const LidarPoint& p) { return p.ring != 0; });
-}
-
-void assign_rings_by_elevation(std::vector<LidarPoint>& points, const ElevationRings& rings,
-                               const std::string& key_prefix) {
-    if (rings.rings < 1 || rings.rings > kMostRings) {
-        throw ConfigError(key_prefix + "rings", std::to_string(rings.rings), "1 to 1024");
-    }
-    const double span = rings.highest - rings.lowest;
-    if (!(span > 0.0) || !std::isfinite(span)) {
-        throw ConfigError(key_prefix + "highest", std::to_string(rings.highest),
-                          "> lowest = " + std::to_string(rings.lowest) + " rad");
-    }
-    const double per_rad = (rings.rings - 1) / span;
-    for (LidarPoint& p : points) {
-        const double elevation =
-            std::atan2(static_cast<double>(p.z),
-                       std::hypot(static_cast<double>(p.x), static_cast<double>(p.y)));
-        const double ring = std::floor((elevation - rings.lowest) * per_rad + 0.5);
-        const bool inside = is_finite(p) && ring >= 0.0 && ring < rings.rings;
-        p.ring = inside ? static_cast<std::uint16_t>(ring) : kNoRing;
-    }
 }
 
 int assign_rings_by_turns(std::vector<LidarPoint>& points) {

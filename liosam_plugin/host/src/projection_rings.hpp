@@ -4,7 +4,6 @@
 
 #include <cstdint>
 #include <limits>
-#include <string>
 #include <vector>
 
 #include "d2lio/types.hpp"
@@ -14,22 +13,9 @@ namespace d2lio::liosam {
 /// Ring of a point that fits none; `Projection` drops and counts it.
 constexpr std::uint16_t kNoRing = std::numeric_limits<std::uint16_t>::max();
 
-/// A sensor whose rings lie at even steps of elevation, ring 0 lowest.
-struct ElevationRings {
-    int rings = 16;          ///< 1 to 1024
-    double lowest = -0.262;  ///< elevation of ring 0, rad
-    double highest = 0.262;  ///< elevation of the top ring, rad, > lowest
-};
-
 /// Whether a scan tells its rings apart: false where every index is 0, as in clouds without that
 /// field and from sensors of one ring.
 bool has_rings(const std::vector<LidarPoint>& points);
-
-/// Sets each point's ring by its elevation as measured: the nearest ring, kNoRing for points more
-/// than half a step outside and non-finite ones. With one ring every finite point is on it.
-/// @throws ConfigError for unusable `rings`, with `key_prefix` before the field's name.
-void assign_rings_by_elevation(std::vector<LidarPoint>& points, const ElevationRings& rings,
-                               const std::string& key_prefix = "lidar.");
 
 /// Sets each point's ring from the message order where rings follow one another, each a turn that
 /// begins straight ahead (+x), as in KITTI's HDL-64E clouds: the azimuth in [0, 2 pi) falls back by
