@@ -11,12 +11,10 @@
 #include "front_end.hpp"
 #include "keyframe_graph.hpp"
 #include "predictor.hpp"
-#include "projection_rings.hpp"
 
 namespace d2lio::liosam {
 namespace {
 
-constexpr int kLeastRings = 4;               ///< turns in a message that are taken for rings
 constexpr int kStartScans = 5;               ///< processed whatever the mapping interval
 constexpr double kLeastLoopVariance = 1e-6;  ///< rad^2 and m^2
 constexpr int kMaxFailures = 10;             ///< refused matches in a row before starting anew
@@ -71,17 +69,17 @@ class Host::Impl {
     bool start_up(const MeasureGroup& group, ScanResult& r);
     bool predict(const MeasureGroup& group, ScanResult& r);
     bool due(const MeasureGroup& group) const;
-    void find_rings(std::vector<LidarPoint>& points, ScanResult& r) const;
     void prepare(MeasureGroup& group, ScanResult& r);
     void start_map(const MeasureGroup& group, ScanResult& r);
     bool enough_features() const;
     Pose match(ScanResult& r);
+    bool matched() const { return report_.status == MatchStatus::kOk; }
     void judge(const MatchReport& report, ScanResult& r);
     void correct(const Pose& estimate, ScanResult& r);
     void grow_map(const MeasureGroup& group, ScanResult& r);
     void close_loop(ScanResult& r);
-    Mat6 in_odometry(const Mat6& covariance) const;
     void begin_epoch();
+    void start_anew(const std::string& why, ScanResult& r);
     void finish(ScanResult& r) const;
 
     MatchCloud cloud_;
@@ -111,6 +109,15 @@ void Host::Impl::begin_epoch() {
     processed_ = 0;
     failures_ = 0;
     health_ = Health::kInit;
+}
+
+/// Begins an epoch, and counts it unless the data did so, which the intake counts.
+void Host::Impl::start_anew(const std::string& why, ScanResult& r) {
+    begin_epoch();
+    if (!r.new_epoch) ++resets_;
+    r.status = ScanStatus::kReset;
+    r.new_epoch = true;
+    say(r, why + ": starting anew");
 }
 
 std::optional<ScanResult> Host::Impl::step() {
@@ -147,15 +154,11 @@ void Host::Impl::process(MeasureGroup& group, ScanResult& r) {
 
 /// Scans before the estimator runs. True if this one was of them.
 bool Host::Impl::start_up(const MeasureGroup& group, ScanResult& r) {
+    r.new_epoch = group.new_epoch;
     const std::string reason = failures_ >= kMaxFailures
                                    ? std::to_string(failures_) + " matches refused in a row"
                                    : intake_.reset_reason(group, predictor_.initialised());
-    if (!reason.empty()) {
-        begin_epoch();
-        if (!group.new_epoch) ++resets_;
-        r.new_epoch = true;
-        say(r, reason + ": starting anew");
-    }
+    if (!reason.empty()) start_anew(reason, r);
     if (predictor_.initialised()) return false;
     const bool fine = predictor_.initialise(group.imu);
     r.status = !fine         ? ScanStatus::kImuFault
@@ -168,11 +171,7 @@ bool Host::Impl::start_up(const MeasureGroup& group, ScanResult& r) {
 bool Host::Impl::predict(const MeasureGroup& group, ScanResult& r) {
     predictor_.advance(group, intake_.loosen(group, predictor_.mean_period(), r));
     if (predictor_.is_finite()) return true;
-    begin_epoch();
-    ++resets_;
-    r.status = ScanStatus::kReset;
-    r.new_epoch = true;
-    say(r, "prediction is not finite: starting anew");
+    start_anew("prediction is not finite", r);
     return false;
 }
 
@@ -181,20 +180,6 @@ bool Host::Impl::predict(const MeasureGroup& group, ScanResult& r) {
 bool Host::Impl::due(const MeasureGroup& group) const {
     return !last_processed_ || processed_ < kStartScans ||
            seconds_between(group.begin, *last_processed_) >= config_.mapping_interval;
-}
-
-/// Clouds without rings get them from the message order where lasers follow one another, as
-/// KITTI's. In any other order features would be nonsense: the scan is left without points then.
-void Host::Impl::find_rings(std::vector<LidarPoint>& points, ScanResult& r) const {
-    if (config_.front_end != FrontEnd::kFeatures || has_rings(points)) return;
-    const int rings = assign_rings_by_turns(points);
-    if (rings >= kLeastRings && rings <= config_.projection.rings) return;
-    if (!points.empty()) {
-        say(r, "no ring index, and " + std::to_string(rings) + " turns in the message for N_SCAN " +
-                   std::to_string(config_.projection.rings) +
-                   ": features cannot be told; use front_end: direct");
-    }
-    points.clear();
 }
 
 /// De-skews to the scan's end and runs the front end.
@@ -206,11 +191,14 @@ void Host::Impl::prepare(MeasureGroup& group, ScanResult& r) {
         end.t.setZero();
         for (MotionKnot& k : knots) k.pos = k.vel = k.accel = Vec3::Zero();
     }
-    find_rings(group.scan.points, r);
-    raw_ = group.scan.points;
+    const bool features = config_.front_end == FrontEnd::kFeatures;
+    if (features) {
+        say(r, features_.find_rings(group.scan.points));
+        raw_ = group.scan.points;
+    }
     deskew(group.scan.points, knots, end, x.T_imu_lidar());
     r.times.deskew = watch_.lap();
-    if (config_.front_end == FrontEnd::kFeatures) {
+    if (features) {
         features_.run(raw_, group.scan.points, x.T_imu_lidar(), cloud_);
     } else {
         direct_.run(group.scan.points, x.T_imu_lidar(), cloud_);
@@ -234,11 +222,7 @@ void Host::Impl::start_map(const MeasureGroup& group, ScanResult& r) {
     const NavState& x = predictor_.state();
     previous_ = x.T_map_imu();
     if (imu_graph_.start(previous_, x.vel, x.gyro_bias, x.accel_bias) != GraphStatus::kOk) {
-        begin_epoch();
-        ++resets_;
-        r.status = ScanStatus::kReset;
-        r.new_epoch = true;
-        say(r, "the inertial graph cannot start from this state: starting anew");
+        start_anew("the inertial graph cannot start from this state", r);
         return;
     }
     predictor_.correct(previous_, loop_correction_.R, imu_graph_.state(), true);
@@ -267,24 +251,21 @@ Pose Host::Impl::match(ScanResult& r) {
         report_ = matcher_.align({cloud_.corners, cloud_.surfaces, map_.corners(), map_.surfaces()},
                                  estimate);
     }
-    if (report_.status == MatchStatus::kOk) {
+    if (matched()) {
         if (const std::optional<Mat3> world = predictor_.orientation()) {
             estimate.R = blend_tilt(estimate.R, *world, config_.rpy_weight);
         }
+        covariance_ = pose_covariance(P, report_.information, config_.matching.variance);
+        matched_covariance_ = covariance_;
     } else {
         estimate = predicted;
+        covariance_ = matched_covariance_ + P;
     }
     adapter_.end_scan({estimate.R.data(), estimate.t.data()}, report_.converged);
     r.diagnostics = adapter_.diagnostics();
     r.diagnostics.iterations = report_.iterations;
     judge(report_, r);
     if (!enough) r.status = ScanStatus::kTooFewPoints;
-    if (report_.status == MatchStatus::kOk) {
-        covariance_ = pose_covariance(P, report_.information, config_.matching.variance);
-        matched_covariance_ = covariance_;
-    } else {
-        covariance_ = matched_covariance_ + P;
-    }
     r.times.search = report_.search_ms;
     r.times.update = watch_.lap() - report_.search_ms;
     return estimate;
@@ -314,18 +295,18 @@ void Host::Impl::correct(const Pose& estimate, ScanResult& r) {
     CorrectionNoise noise{config_.correction_rotation, config_.correction_translation,
                           config_.degenerate_rotation, config_.degenerate_translation};
     const bool own_remedy = !adapter_.has_prior();
-    const Mat6 C = report_.status != MatchStatus::kOk ? lost_covariance(noise)
-                   : own_remedy                       ? upstream_correction(noise, report_.remapped)
-                                                      : weak_correction(noise, r.diagnostics);
-    const GraphStatus status = imu_graph_.correct(loop_correction_.inverse() * estimate,
-                                                  in_odometry(C), predictor_.steps());
+    const Mat6 C = !matched()   ? lost_covariance(noise)
+                   : own_remedy ? upstream_correction(noise, report_.remapped)
+                                : weak_correction(noise, r.diagnostics);
+    const GraphStatus status =
+        imu_graph_.correct(loop_correction_.inverse() * estimate,
+                           turn_position(loop_correction_.R.transpose(), C), predictor_.steps());
     if (status != GraphStatus::kOk) {
         ++graph_events_;
         say(r, status == GraphStatus::kReset ? "speed or bias out of bounds: inertial graph reset"
                                              : "inertial graph recovered");
     }
-    predictor_.correct(estimate, loop_correction_.R, imu_graph_.state(),
-                       report_.status == MatchStatus::kOk);
+    predictor_.correct(estimate, loop_correction_.R, imu_graph_.state(), matched());
     previous_ = estimate;
 }
 
@@ -354,13 +335,6 @@ void Host::Impl::close_loop(ScanResult& r) {
     matched_covariance_ = covariance_;
     ++loops_closed_;
     say(r, "loop closed with keyframe " + std::to_string(loop->from));
-}
-
-/// Position axes of a covariance (rotation body, position map) turned to the inertial graph's.
-Mat6 Host::Impl::in_odometry(const Mat6& C) const {
-    Mat6 J = Mat6::Identity();
-    J.bottomRightCorner<3, 3>() = loop_correction_.R.transpose();
-    return J * C * J.transpose();
 }
 
 void Host::Impl::finish(ScanResult& r) const {

@@ -59,6 +59,12 @@ Mat6 pose_covariance(const Mat6& P, const Mat6& AtA, double variance) {
 
 Mat6 start_covariance() { return diagonal(kStartSigma, kStartSigma); }
 
+Mat6 turn_position(const Mat3& R, const Mat6& C) {
+    Mat6 J = Mat6::Identity();
+    J.bottomRightCorner<3, 3>() = R;
+    return J * C * J.transpose();
+}
+
 Mat6 ros_order(const Pose& T, const Mat6& C) {
     Mat6 J = Mat6::Zero();
     J.topRightCorner<3, 3>().setIdentity();

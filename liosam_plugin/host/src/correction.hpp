@@ -9,8 +9,6 @@
 /// (map axes), unless said otherwise.
 namespace d2lio::liosam {
 
-using Mat6 = Eigen::Matrix<double, 6, 6>;
-
 /// Sigmas of a matched pose in the inertial graph, rad and m.
 struct CorrectionNoise {
     double rotation, translation;
@@ -29,6 +27,8 @@ Mat6 lost_covariance(const CorrectionNoise& noise);
 Mat6 pose_covariance(const Mat6& P, const Mat6& AtA, double variance);
 /// Of the first pose, which defines the map.
 Mat6 start_covariance();
+/// The same covariance with the position in axes turned by R.
+Mat6 turn_position(const Mat3& R, const Mat6& covariance);
 /// Position, then rotation about the map's axes.
 Mat6 ros_order(const Pose& T_map_imu, const Mat6& covariance);
 

@@ -2,6 +2,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
+#include <string>
 #include <vector>
 
 #include "d2lio/preprocess/voxel_grid.hpp"
@@ -22,11 +23,16 @@ class FeatureFrontEnd {
     FeatureFrontEnd(const ProjectionOptions& projection, const FeatureOptions& features,
                     float corner_leaf, float surface_leaf);
 
+    /// Clouds without rings get them from the message order where lasers follow one another, as
+    /// KITTI's. In any other order features would be nonsense: the scan is left without points.
+    /// @returns why it was, else nothing.
+    std::string find_rings(std::vector<LidarPoint>& points) const;
     /// @param raw as measured; @param deskewed the same points at the scan's end, LiDAR frame.
     void run(const std::vector<LidarPoint>& raw, const std::vector<LidarPoint>& deskewed,
              const Pose& T_imu_lidar, MatchCloud& out);
 
   private:
+    int rings_;  ///< of the sensor
     Projection projection_;
     FeatureExtractor extractor_;
     VoxelGrid corner_grid_, surface_grid_;
