@@ -244,7 +244,7 @@ TEST(Adapter, PriorRowsEqualTheInformationForm) {
     for (int i = 0; i < 6; ++i) {
         for (int j = 0; j < 6; ++j) J(i, j) = prior.jacobian[i][j];
     }
-    const Eigen::Matrix<double, 6, 6> information = J.transpose() * J / kVariance;
+    const Mat6 information = J.transpose() * J / kVariance;
     // The same weight from its definition, w P^-1/2 (A^T A)^-1 P^-1/2.
     const auto weight = [](const Mat3& AtA, const Mat3& P) -> Mat3 {
         const Eigen::SelfAdjointEigenSolver<Mat3> root(P);

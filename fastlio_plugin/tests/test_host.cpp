@@ -70,7 +70,7 @@ TEST(Host, CovarianceIsSymmetricPositiveDefiniteAndOfThisScan) {
     for (const auto& r : test::run()) {
         if (r.status != ScanStatus::kOk) continue;
         EXPECT_LT((r.covariance - r.covariance.transpose()).norm(), 1e-15);
-        const Eigen::SelfAdjointEigenSolver<Eigen::Matrix<double, 6, 6>> s(r.covariance);
+        const Eigen::SelfAdjointEigenSolver<Mat6> s(r.covariance);
         EXPECT_GT(s.eigenvalues()[0], 0.0);
     }
 }

@@ -238,7 +238,7 @@ void BM_ImuGraphCorrect(benchmark::State& state) {
     const ImuGraphOptions options;
     test::ImuSim sim(1, options);
     ImuGraph graph(options);
-    const Mat6x6 C = test::matcher_covariance();
+    const Mat6 C = test::matcher_covariance();
     graph.start(sim.truth.pose, sim.truth.vel, Vec3::Zero(), Vec3::Zero());
     Samples samples;
     for (auto _ : state) {

@@ -13,8 +13,6 @@
 namespace d2lio::liosam {
 namespace {
 
-using Mat6 = Eigen::Matrix<double, 6, 6>;
-
 constexpr double kRate = 100.0;  ///< Hz
 const Vec3 kGravity(0.0, 0.0, 9.80511);
 

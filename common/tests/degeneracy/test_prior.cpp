@@ -149,16 +149,16 @@ TEST(PriorRows, NormalEquationsEqualTheInformationForm) {
         const double variance = 0.001;
         const PriorRows rows = make_prior_rows(prior, e_r, e_t, variance);
         ASSERT_EQ(rows.count, 6);
-        Eigen::Matrix<double, 6, 6> A;
+        Mat6 A;
         A << rows.rotation, rows.translation;
-        Eigen::Matrix<double, 6, 6> J = Eigen::Matrix<double, 6, 6>::Identity();
+        Mat6 J = Mat6::Identity();
         J.topLeftCorner<3, 3>() = right_jacobian_inverse_so3(e_r);
-        Eigen::Matrix<double, 6, 6> W = Eigen::Matrix<double, 6, 6>::Zero();
+        Mat6 W = Mat6::Zero();
         W.topLeftCorner<3, 3>() = prior.W_r;
         W.bottomRightCorner<3, 3>() = prior.W_t;
         Eigen::Matrix<double, 6, 1> e;
         e << e_r, e_t;
-        const Eigen::Matrix<double, 6, 6> expected = J.transpose() * W * J;
+        const Mat6 expected = J.transpose() * W * J;
         const Eigen::Matrix<double, 6, 1> gradient = -J.transpose() * W * e;
         EXPECT_LT((A.transpose() * A / variance - expected).norm(), kExact * expected.norm());
         EXPECT_LT((A.transpose() * rows.residual / variance - gradient).norm(),

@@ -51,7 +51,7 @@ inline void expect_sound(const ScanResult& r) {
     EXPECT_TRUE(r.state.is_finite());
     ASSERT_TRUE(r.covariance.allFinite());
     if (!r.has_pose) return;
-    const Eigen::SelfAdjointEigenSolver<Eigen::Matrix<double, 6, 6>> s(r.covariance);
+    const Eigen::SelfAdjointEigenSolver<Mat6> s(r.covariance);
     const double largest = s.eigenvalues()[5];
     EXPECT_GE(s.eigenvalues()[0], -kRounding * largest);
     EXPECT_LE((r.covariance - r.covariance.transpose()).cwiseAbs().maxCoeff(), kRounding * largest);

@@ -239,9 +239,9 @@ void Host::Impl::finish(ScanResult& r) const {
     r.covariance = pose_covariance(x_, P_);
 }
 
-Eigen::Matrix<double, 6, 6> pose_covariance(const NavState& x, const Mat23x23& P) {
+Mat6 pose_covariance(const NavState& x, const Mat23x23& P) {
     // Both blocks are contiguous (position 0-2, rotation 3-5); the body tangent turns into the map.
-    Eigen::Matrix<double, 6, 6> J = Eigen::Matrix<double, 6, 6>::Identity();
+    Mat6 J = Mat6::Identity();
     J.bottomRightCorner<3, 3>() = x.rot;
     return J * P.topLeftCorner<6, 6>() * J.transpose();
 }

@@ -24,8 +24,6 @@ constexpr double kMinCosPitch = 1e-6;  ///< nearer to 90 deg of pitch the variab
 
 constexpr float kReject = std::numeric_limits<float>::infinity();
 
-using Mat6 = Eigen::Matrix<double, 6, 6>;
-using Vec6 = Eigen::Matrix<double, 6, 1>;
 using Mat6Map = Eigen::Map<Mat6>;
 using Vec6Map = Eigen::Map<Vec6>;
 
@@ -42,7 +40,7 @@ PriorTerm hold(const PriorTerm& term, const Mat6& AtA) {
 }
 
 void add_rows(const PriorRows& rows, const NormalEquations& eq) {
-    Eigen::Matrix<double, 6, 6> J;
+    Mat6 J;
     J << rows.rotation, rows.translation;
     Mat6Map(eq.AtA).noalias() += J.transpose() * J;
     Vec6Map(eq.Atb).noalias() += J.transpose() * rows.residual;

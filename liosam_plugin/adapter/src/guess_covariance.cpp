@@ -16,7 +16,6 @@ namespace d2lio::liosam {
 namespace {
 
 using Mat15 = Eigen::Matrix<double, 15, 15>;
-using Mat6 = Eigen::Matrix<double, 6, 6>;
 
 constexpr int kRot = 0, kPos = 3, kVel = 6, kAccelBias = 9, kGyroBias = 12;
 

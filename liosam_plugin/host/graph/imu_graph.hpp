@@ -13,7 +13,6 @@
 
 namespace d2lio::liosam {
 
-using Mat6x6 = Mat6;
 using Mat15x15 = Eigen::Matrix<double, 15, 15>;
 
 /// Noise, priors and bounds; the defaults are LIO-SAM's. All but reset_keys are at least 1e-9.

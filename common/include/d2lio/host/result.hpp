@@ -44,7 +44,7 @@ struct ScanResult {
     double imu_gap_s = 0.0, lidar_gap_s = 0.0;
     NavState state;
     /// Pose covariance in ROS order (x y z, rx ry rz), map frame, m^2 and rad^2.
-    Eigen::Matrix<double, 6, 6> covariance = Eigen::Matrix<double, 6, 6>::Zero();
+    Mat6 covariance = Mat6::Zero();
     ScanDiagnostics diagnostics;
     std::size_t points_raw = 0, points_valid = 0, points_downsampled = 0, map_points = 0;
     StageTimes times;

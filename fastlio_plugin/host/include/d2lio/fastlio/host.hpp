@@ -48,6 +48,6 @@ class Host {
 };
 
 /// Pose covariance of a 23-state filter in ROS order: position, then rotation about the map's axes.
-Eigen::Matrix<double, 6, 6> pose_covariance(const NavState& x, const Mat23x23& P);
+Mat6 pose_covariance(const NavState& x, const Mat23x23& P);
 
 }  // namespace d2lio::fastlio
