@@ -277,7 +277,7 @@ void BM_PredictorAdvance(benchmark::State& state) {
         samples.start();
         predictor.advance(group, 1.0);
         samples.stop(state);
-        predictor.correct(predictor.state().T_map_imu(), Mat3::Identity(), graph);
+        predictor.correct(predictor.state().T_map_imu(), Mat3::Identity(), graph, true);
     }
     samples.report(state);
 }

@@ -30,7 +30,7 @@ class Predictor {
     /// @param matched whether the pose was measured; if it is the prediction itself, the pose's
     /// covariance goes on growing.
     void correct(const Pose& T_map_imu, const Mat3& R_map_odometry, const GraphState& graph,
-                 bool matched = true);
+                 bool matched);
 
     const NavState& state() const { return x_; }
     /// 6x6 of the pose relative to the last matched one: rotation (right, body), position (map).

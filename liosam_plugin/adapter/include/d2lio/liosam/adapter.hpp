@@ -27,8 +27,8 @@ enum class Feature : std::uint8_t { kCorner, kSurface };
 struct ScanInput {
     PoseView previous;         ///< estimate of the last scan
     PoseView predicted;        ///< initial guess for this one
-    const double* covariance;  ///< of the guess relative to the last estimate, 6 x 6 column-major,
-                               ///< order: rotation (right tangent, body), position (map axes)
+    const double* covariance;  ///< of the guess relative to the last matched pose, 6 x 6
+                               ///< column-major: rotation (right tangent, body), position (map)
     std::size_t corners, surfaces;  ///< features to be offered
 };
 
