@@ -31,6 +31,24 @@ function(d2lio_upstream_library name host)
   target_link_libraries(${name} PRIVATE Eigen3::Eigen)
 endfunction()
 
+# The glue is C++14; what upstream asks for stays if it is later. On the command line the last -std
+# counts: CMAKE_CXX_FLAGS, then the options, then the property.
+function(d2lio_upstream_standard target)
+  get_target_property(standard ${target} CXX_STANDARD)
+  get_target_property(options ${target} COMPILE_OPTIONS)
+  string(REGEX MATCHALL "-std=[a-z]+[+][+][0-9a-z]+" asked "${CMAKE_CXX_FLAGS} ${options}")
+  if(standard)
+    if(standard MATCHES "^(98|11)$")
+      set_target_properties(${target} PROPERTIES CXX_STANDARD 14)
+    endif()
+  elseif(asked)
+    list(GET asked -1 last)
+    if(last MATCHES "[+](98|03|0x|11)$")
+      target_compile_options(${target} PRIVATE -std=c++14)
+    endif()
+  endif()
+endfunction()
+
 function(d2lio_upstream target host)
   set(library d2lio_upstream_${host})
   if(NOT TARGET ${library})
@@ -41,11 +59,7 @@ function(d2lio_upstream target host)
   else()
     target_compile_definitions(${target} PRIVATE D2LIO_ROS=1)
   endif()
-  # The glue is C++14; what upstream asks for stays if it is later (the last -std counts).
-  get_target_property(standard ${target} CXX_STANDARD)
-  if(NOT standard AND CMAKE_CXX_FLAGS MATCHES "-std=(c|gnu)\\+\\+(0x|11)[^=]*$")
-    target_compile_options(${target} PRIVATE -std=c++14)
-  endif()
+  d2lio_upstream_standard(${target})
   target_include_directories(${target} PRIVATE
                              "${D2LIO_UPSTREAM_ROOT}/common/ros/include"
                              "${D2LIO_UPSTREAM_ROOT}/${host}_plugin/ros/include")
