@@ -6,6 +6,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -17,17 +18,38 @@ from d2lio.datasets.livox import MESSAGE_TYPES as LIVOX_TYPES
 from d2lio.datasets.livox import decode_custom_msg
 from d2lio.datasets.ordering import ImuMessage, gather
 from d2lio.datasets.pointcloud2 import decode_cloud
+from d2lio.datasets.velodyne import MESSAGE_TYPES as VELODYNE_TYPES
+from d2lio.datasets.velodyne import decode_velodyne_scan
 from d2lio.errors import DataError
 
-CLOUD_TYPES = ("sensor_msgs/msg/PointCloud2", *LIVOX_TYPES)
+CLOUD_TYPES = ("sensor_msgs/msg/PointCloud2", *LIVOX_TYPES, *VELODYNE_TYPES)
 IMU_TYPES = ("sensor_msgs/msg/Imu",)
 STANDARD_GRAVITY = 9.80665  # m/s^2 per g
 UNIT_TOLERANCE = 1e-2  # of a quaternion's norm; single precision and rounding drivers stay below
 NO_ROTATION = (0.0, 0.0, 0.0, 1.0)
 
 
-def _stamp(header: Any) -> int:
+def header_stamp(header: Any) -> int:
+    """Stamp of a std_msgs/Header, ns."""
     return int(header.stamp.sec) * NS_PER_S + int(header.stamp.nanosec)
+
+
+def decode_scan(message: Message, config: SourceConfig, notes: Notes) -> RawScan:
+    """Points of a message of one of CLOUD_TYPES; `notes` counts what its packets lack.
+
+    Raises:
+        DataError: a message whose sizes or fields contradict each other.
+    """
+    if message.msgtype in LIVOX_TYPES:
+        return decode_custom_msg(message.raw, message.log_stamp, cdr=message.cdr)
+    if message.msgtype in VELODYNE_TYPES:
+        model = config.lidar.model.lower()
+        return decode_velodyne_scan(
+            message.raw, message.log_stamp, cdr=message.cdr, model=model, notes=notes
+        )
+    cloud = message.decode()
+    stamp = header_stamp(cloud.header)
+    return decode_cloud(cloud, stamp, message.log_stamp, config.lidar.time_field)
 
 
 def orientation_of(imu: Any) -> tuple[float, float, float, float] | None:
@@ -62,6 +84,8 @@ class BagReader:
             topics = bag.topics
         self.lidar_topic = self._choose(topics, config.lidar.topic, CLOUD_TYPES, "lidar")
         self.imu_topic = self._choose(topics, config.imu.topic, IMU_TYPES, "imu")
+        if self.lidar_topic.msgtype in VELODYNE_TYPES:  # the decoder's own times
+            self.time_hint = replace(self.time_hint, unit="ns", reference="start")
 
     @property
     def scan_total(self) -> int | None:
@@ -131,22 +155,14 @@ class BagReader:
             self.notes.count("imu_read")
             return self._decode_imu(message)
         self.notes.count("scans_read")
-        return self._decode_scan(message)
+        return decode_scan(message, self._config, self.notes)
 
     def _decode_imu(self, message: Message) -> ImuMessage:
         imu = message.decode()
         w, f = imu.angular_velocity, imu.linear_acceleration
         k = STANDARD_GRAVITY if self._config.imu.accel_unit == "g" else 1.0
         log_times = self._config.stamps == "log"
-        stamp = message.log_stamp if log_times else _stamp(imu.header)
+        stamp = message.log_stamp if log_times else header_stamp(imu.header)
         values = (w.x, w.y, w.z, k * f.x, k * f.y, k * f.z)
         orientation = None if self._config.imu.orientation is False else orientation_of(imu)
         return ImuMessage(stamp, message.log_stamp, values, orientation)
-
-    def _decode_scan(self, message: Message) -> RawScan:
-        if message.msgtype in LIVOX_TYPES:
-            return decode_custom_msg(message.raw, message.log_stamp, cdr=message.cdr)
-        cloud = message.decode()
-        return decode_cloud(
-            cloud, _stamp(cloud.header), message.log_stamp, self._config.lidar.time_field
-        )
