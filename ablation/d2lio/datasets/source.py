@@ -36,7 +36,9 @@ def open_source(path: Path, config: Path | None = None, stamps: str | None = Non
 
     Args:
         path: directory or file.
-        config: YAML for anything that is not a sequence directory (`SourceConfig`).
+        config: YAML for anything that is not a sequence directory (`SourceConfig`), or the name of
+            a known device, DATASET/DEVICE (see `d2lio datasets`). A bag recognised as a known
+            sequence needs none.
         stamps: header or log; overrides the configuration.
 
     Raises:
@@ -73,14 +75,37 @@ def _open_sequence(path: Path, stamps: str | None) -> Source:
 def _open_bag(path: Path, config_file: Path | None, stamps: str | None) -> Source:
     from d2lio.datasets.bag import BagReader
 
-    config = SourceConfig() if config_file is None else SourceConfig.load(config_file)
+    config, remarks = _bag_config(path, config_file)
     config = _with_stamps(config, stamps)
     reader = BagReader(path, config)
     config = _named_after_messages(config, reader.lidar_topic.msgtype)
-    if config_file is None:
-        reader.notes.tell("no --config given: T_imu_lidar is taken as identity")
+    for remark in remarks:
+        reader.notes.tell(remark)
     truth = _beside(config, config_file)
     return Source(config.name or path.stem, reader, config, truth)
+
+
+def _bag_config(path: Path, config_file: Path | None) -> tuple[SourceConfig, list[str]]:
+    """The configuration given, or that of the known device; remarks for the user."""
+    from d2lio.datasets.bagfile import open_bag
+    from d2lio.datasets.catalog import device_named
+    from d2lio.datasets.recognise import has_topics, recognise
+
+    known = None
+    if config_file is not None:
+        known = None if config_file.exists() else device_named(config_file.as_posix())
+        if known is None:
+            return SourceConfig.load(config_file), []
+    with open_bag(path) as bag:
+        topics = {t.name: t.msgtype for t in bag.topics if t.count}
+    if known is not None:
+        return known.source_config(path.stem, topics), known.remarks()
+    match = recognise(path, topics)
+    if match is None or match.sequence is None or not has_topics(match.device, topics):
+        return SourceConfig(), ["no --config given: T_imu_lidar is taken as identity"]
+    name = f"{match.dataset.name}/{match.device_name}"
+    said = f"recognised as {match.sequence.name} of {name}; --config replaces what is known of it"
+    return match.device.source_config(match.sequence.name, topics), [said, *match.device.remarks()]
 
 
 def _named_after_messages(config: SourceConfig, msgtype: str) -> SourceConfig:
