@@ -12,8 +12,9 @@ from d2lio.datasets.catalog import datasets, device
 from d2lio.datasets.recognise import find_truth, recognise
 from d2lio.datasets.truth import at_truth_body, moved, read_csv_ns, read_truth
 from d2lio.errors import ConfigError, DataError
-from d2lio.metrics import read_tum
+from d2lio.metrics import evaluate, read_tum
 from d2lio.metrics.tum import Trajectory
+from d2lio.metrics.tum import write as write_tum
 from d2lio.sequence import ROTATION_TOLERANCE
 from d2lio.source_params import source_params
 from scipy.spatial.transform import Rotation
@@ -228,3 +229,21 @@ def test_ecmd_truth_once_a_second(tmp_path: Path) -> None:
     assert truth.in_imu_frame
     assert truth.trajectory.period_s == pytest.approx(1.0)
     np.testing.assert_allclose(truth.trajectory.positions, read_tum(file).positions)
+
+
+def test_moving_the_estimate_to_the_prism_takes_the_levers_error_away(tmp_path: Path) -> None:
+    pytest.importorskip("evo", reason="evo is not installed (an extra)")
+    kind = datasets()["geode"].truths["leica"]
+    imu = wandering(count=100, seed=5)
+    body = moved(imu, np.linalg.inv(kind.devices["beta"].matrix()))
+    file = write_truth(tmp_path / "t.txt", body, offset=np.zeros(3), rotation=False)
+    truth = read_truth(file, kind, "beta")
+    write_tum(tmp_path / "imu.tum", imu)
+    write_tum(tmp_path / "moved.tum", at_truth_body(imu, truth))
+    errors = {}
+    for name in ("imu", "moved"):
+        result, _ = evaluate(tmp_path / f"{name}.tum", file)
+        assert result.position_only
+        assert result.ate is not None
+        errors[name] = result.ate.rmse
+    assert errors["moved"] < 1e-6 < 0.1 < errors["imu"]

@@ -43,6 +43,8 @@ class BagFile(AbstractContextManager["BagFile"]):
     """An open recording: its topics and an iterator over messages in order of reception."""
 
     topics: list[Topic]
+    begin: int = 0  # time of reception of the first message, ns
+    end: int = 0  # and of the last
 
     def messages(self, names: Sequence[str]) -> Iterator[Message]:
         """Messages of the named topics in order of reception."""
@@ -67,6 +69,7 @@ class _RosbagsFile(BagFile):
     def __init__(self, paths: Sequence[Path]) -> None:
         self._reader = AnyReader(list(paths))
         self._reader.open()
+        self.begin, self.end = self._reader.start_time, self._reader.end_time
         connections = self._reader.connections
         names = sorted({c.topic for c in connections})
         self.topics = [
@@ -127,7 +130,15 @@ def open_bag(path: Path) -> BagFile:
     Raises:
         DataError: missing, empty, truncated, unindexed or of an unknown kind.
     """
-    paths = expand(path)
+    return open_files(expand(path), path)
+
+
+def open_files(paths: Sequence[Path], path: Path) -> BagFile:
+    """Opens files as one recording; `path` is what messages call it.
+
+    Raises:
+        DataError: as `open_bag`.
+    """
     empty = [str(p) for p in paths if p.is_file() and p.stat().st_size == 0]
     if empty:
         raise DataError(f"{empty[0]}: the file is empty")

@@ -38,6 +38,8 @@ class McapRos1File(BagFile):
         encodings = {c.message_encoding for c in summary.channels.values()}
         if encodings - {"ros1"}:
             raise DataError(f"{self._path}: message encodings {sorted(encodings)}, expected ros1")
+        self.begin = summary.statistics.message_start_time
+        self.end = summary.statistics.message_end_time
         counts = summary.statistics.channel_message_counts
         self._store = get_typestore(Stores.EMPTY)
         types: dict = {}

@@ -41,6 +41,11 @@ class TimeResolver:
         self._locked = False
         self._failed_at_start = 0
 
+    @property
+    def found(self) -> TimeHint | None:
+        """Unit and reference the first good scan showed, None before it."""
+        return self._hint if self._locked else None
+
     def resolve(self, raw: RawScan) -> Scan | None:
         """The scan with its times; None for a scan that must be dropped (counted).
 
