@@ -25,7 +25,8 @@ NAMES = {
     "rc2": "Hawkins_Long_Corridor",
     "ecmd": "Bridge_day_medium_b",
 }
-INCOMPLETE, DATA = 1, 3
+INCOMPLETE, USAGE, DATA = 1, 2, 3
+LEVER_M = 0.4784  # of gamma to the prism, as published
 TIME_F32_NS = 10
 
 
@@ -274,3 +275,19 @@ def test_real_recordings_of_no_known_data_set(real_data) -> None:
     assert "in ns from the scan's start" in said(report, "ok")
     report = check(real_data("ouster_sdk_tests/512x10_raw.bag"))
     assert "no topic of a type that can be read" in said(report, "missing")
+
+
+def test_estimate_moved_to_position_only_truth(tmp_path: Path) -> None:
+    bag = tmp_path / "Tunneling_tunnel2_gamma.bag"
+    bag.touch()
+    prism = [f"{i} {0.1 * i} 0 0 0 0 0 0" for i in range(15)]
+    (tmp_path / "Tunneling_tunnel2.txt").write_text("\n".join(prism) + "\n")
+    estimate, moved, out = (tmp_path / name for name in ("e.tum", "m.tum", "gt.tum"))
+    estimate.write_text("".join(f"{i} {0.1 * i} 0 0 0 0 0 1\n" for i in range(15)))
+    done = run("truth", bag, "--out", out, "--estimate", estimate, "--moved", moved)
+    assert done.exit_code == 0, done.output
+    assert "the estimate must be moved" in " ".join(done.stderr.split())
+    assert read_tum(out).position_only
+    lever = read_tum(moved).positions - read_tum(estimate).positions
+    np.testing.assert_allclose(np.linalg.norm(lever, axis=1), LEVER_M, atol=1e-3)
+    assert run("truth", bag, "--out", out, "--estimate", estimate).exit_code == USAGE

@@ -206,7 +206,7 @@ def truth(
 ) -> None:
     """Write a sequence's ground truth for `d2lio evaluate`: TUM, poses of the IMU where known."""
     from d2lio.datasets.recognise import find_truth, recognise
-    from d2lio.datasets.truth import at_truth_body, read_truth
+    from d2lio.datasets.truth import at_truth_body, read_truth, write_truth
     from d2lio.errors import ConfigError, DataError
     from d2lio.metrics import tum
 
@@ -222,7 +222,7 @@ def truth(
         known = read_truth(file, match.truth, match.device_name)
         for remark in known.notes:
             note(remark)
-        tum.write(out, known.trajectory)
+        write_truth(out, known)
         if estimate is not None and moved is not None:
             tum.write(moved, at_truth_body(tum.read_tum(estimate), known))
         stdout().print(f"{tail(file)} -> {tail(out)}: {_named(match)}", highlight=False)

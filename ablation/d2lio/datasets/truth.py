@@ -13,7 +13,7 @@ from scipy.spatial.transform import Rotation
 
 from d2lio.datasets.catalog import Truth
 from d2lio.errors import DataError
-from d2lio.metrics.tum import Trajectory, read_tum
+from d2lio.metrics.tum import Trajectory, read_tum, write
 
 CSV_COLUMNS = 8
 FAR_M = 1e4  # positions further out are map coordinates (UTM)
@@ -101,6 +101,18 @@ def read_truth(path: Path, truth: Truth, device: str) -> GroundTruth:
             )
         return GroundTruth(trajectory, same, T_gt_imu, origin, notes)
     return GroundTruth(moved(trajectory, T_gt_imu), True, T_gt_imu, origin, notes)
+
+
+def write_truth(path: Path, truth: GroundTruth) -> None:
+    """Writes TUM; positions without attitude keep their quaternion 0 0 0 0.
+
+    Raises:
+        DataError: cannot be written.
+    """
+    trajectory = truth.trajectory
+    if trajectory.position_only:  # an identity would be taken for an attitude
+        trajectory = replace(trajectory, quaternions=np.zeros((len(trajectory), 4)))
+    write(path, trajectory)
 
 
 def moved(trajectory: Trajectory, T_body_other: np.ndarray) -> Trajectory:
