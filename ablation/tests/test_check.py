@@ -25,7 +25,7 @@ NAMES = {
     "rc2": "Hawkins_Long_Corridor",
     "ecmd": "Bridge_day_medium_b",
 }
-INCOMPLETE, USAGE, DATA = 1, 2, 3
+USAGE, DATA, INCOMPLETE = 2, 3, 4
 LEVER_M = 0.4784  # of gamma to the prism, as published
 TIME_F32_NS = 10
 

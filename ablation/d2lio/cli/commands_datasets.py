@@ -14,13 +14,22 @@ from rich.console import Console
 from rich.markup import escape
 from rich.table import Table
 
-from d2lio.cli.common import EXIT_DATA, complain, emit_json, guard, note, progress_bar, stdout, tail
+from d2lio.cli.common import (
+    EXIT_DATA,
+    EXIT_FAILED,
+    complain,
+    emit_json,
+    guard,
+    note,
+    progress_bar,
+    stdout,
+    tail,
+)
 
 if TYPE_CHECKING:
     from d2lio.datasets.check import Report
     from d2lio.datasets.recognise import Match
 
-EXIT_INCOMPLETE = 1
 WIDTH_PIPED = 200
 COLOURS = {"ok": "green", "note": "yellow", "wrong": "red", "missing": "red"}
 
@@ -100,7 +109,7 @@ def check(
     full: Annotated[bool, typer.Option("--full", help="Read everything.")] = False,
     as_json: JsonOption = False,
 ) -> None:
-    """Say what is there, missing or wrong; exit code 1 if anything is missing or wrong."""
+    """Say what is there, missing or wrong; exit code 4 if anything is missing or wrong."""
     from d2lio.datasets.check import check_recording
     from d2lio.datasets.recordings import find_recordings
 
@@ -108,7 +117,7 @@ def check(
         recordings = find_recordings(directory)
         if not recordings:
             complain(f"{directory}: no .bag, .mcap or metadata.yaml below it")
-            raise typer.Exit(EXIT_INCOMPLETE)
+            raise typer.Exit(EXIT_FAILED)
         reports = []
         for recording in recordings:
             with progress_bar(recording.path.name) as update:
@@ -118,7 +127,7 @@ def check(
         else:
             _print_reports(reports)
         if any(report.verdict in ("missing", "wrong") for report in reports):
-            raise typer.Exit(EXIT_INCOMPLETE)
+            raise typer.Exit(EXIT_FAILED)
 
 
 def _named(match: Match | None) -> str:
