@@ -7,6 +7,7 @@
 #include <cmath>
 #include <limits>
 #include <map>
+#include <random>
 #include <string>
 
 #include "d2lio/diagnostics/scan_diagnostics.hpp"
@@ -155,6 +156,40 @@ TEST(Adapter, SingularPlanesHaveTheirOwnReason) {
     EXPECT_EQ(a.accept(line.candidate(0), &m), Verdict::kSingularPlane);
     a.end_scan(Scene().view(), true, nullptr, 0);
     EXPECT_EQ(a.diagnostics().counts.singular_plane, 1);
+}
+
+/// A mode that keeps the host's gates and whose threshold never binds decides as upstream does: the
+/// thin patch that a mode of ours would call singular is a plane to upstream.
+TEST(Adapter, KeptHostGatesWithAnIdleThresholdDecideAsOff) {
+    Adapter off, kept;
+    kept.set("rejection.mode", "fixed");
+    kept.set("rejection.keep_host_gate", "true");
+    kept.set("rejection.tau", "2.2361");
+    off.begin_scan(Scene().input(200));
+    kept.begin_scan(Scene().input(200));
+    std::mt19937 random(11);
+    std::uniform_real_distribution<float> unit(-1.F, 1.F);
+    int accepted = 0;
+    for (std::size_t i = 0; i < 200; ++i) {
+        Patch patch;
+        for (int k = 0; k < 5; ++k) {
+            patch.neighbours[3 * k] = unit(random);
+            const float width = i % 2 == 0 ? 1e-3F : 1.F;
+            patch.neighbours[3 * k + 1] = width * unit(random);
+            patch.neighbours[3 * k + 2] = 2.F + 0.08F * width * unit(random);
+            patch.sq[k] = 1.2F * static_cast<float>(k + 1);
+        }
+        patch.sq[4] = 4.F + 2.F * std::abs(unit(random));
+        patch.p[2] = 2.F + 0.5F * unit(random);
+        Correspondence a{}, b{};
+        const Verdict verdict = off.accept(patch.candidate(i), &a);
+        EXPECT_EQ(kept.accept(patch.candidate(i), &b), verdict) << i;
+        if (verdict != Verdict::kAccepted) continue;
+        ++accepted;
+        EXPECT_EQ(a.residual, b.residual);
+    }
+    EXPECT_GT(accepted, 20);
+    EXPECT_LT(accepted, 180);
 }
 
 TEST(Adapter, BadCallsAreRefusedWithoutHarm) {

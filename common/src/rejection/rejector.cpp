@@ -32,7 +32,7 @@ void RejectionConfig::bind(ParamTable& table) {
     table.add("rejection.mode", mode, {"off", "none", "fixed", "kiss", "point_adaptive"},
               "strategy; off leaves the host's own gates alone");
     table.add("rejection.keep_host_gate", keep_host_gate,
-              "keep the host's own distance gates on top of the strategy");
+              "keep all gates of the host, and no others, on top of the strategy");
     table.add("rejection.tau", tau, {0.0, 1e6}, "m", "threshold of mode fixed");
     table.add("rejection.sigma_0", sigma_0, {1e-6, 1e6}, "m", "first sigma of mode kiss");
     table.add("rejection.delta_min", delta_min, {0.0, 1e6}, "m",

@@ -25,7 +25,7 @@ Verdict Gate::fit(const Candidate& c, const Rejector& rejector) {
 
     PlaneFitOptions options;
     options.max_distance = G::kPlaneDistance;
-    if (!rejector.active()) options.min_spread_ratio = 0.0;  // upstream has no such check
+    if (rejector.host_gates()) options.min_spread_ratio = 0.0;  // upstream has no such check
     switch (fit_plane(c.neighbours, static_cast<int>(c.neighbour_step), G::kNeighbours, options,
                       planes_[c.index])) {
         case PlaneStatus::kSingular:
