@@ -45,20 +45,32 @@ Mat15 start_covariance() {
     return P;
 }
 
-/// One step of the error state (Sola, section 5.4), attitude R at its start; then R moves on.
-void step(const Vec3& accel, const Vec3& gyro, double dt, const GuessNoise& n, Mat3& R,
-          Transition& t) {
-    Mat15 F = Mat15::Identity();
-    const Mat3 turn = exp_so3(gyro * dt);
-    F.block<3, 3>(kRot, kRot) = turn.transpose();
-    F.block<3, 3>(kRot, kGyroBias) = -dt * Mat3::Identity();
-    F.block<3, 3>(kVel, kRot) = -dt * R * hat(accel);
-    F.block<3, 3>(kVel, kAccelBias) = -dt * R;
-    F.block<3, 3>(kPos, kRot) = 0.5 * dt * F.block<3, 3>(kVel, kRot);
-    F.block<3, 3>(kPos, kAccelBias) = -0.5 * dt * dt * R;
-    F.block<3, 3>(kPos, kVel) = dt * Mat3::Identity();
-    t.Phi = F * t.Phi;
-    t.Q = F * t.Q * F.transpose();
+/// The transition matrix F of one step (Sola, section 5.4): the identity but for these blocks.
+struct Step {
+    double dt;
+    Mat3 turn;   ///< attitude's own
+    Mat3 force;  ///< of the velocity by the attitude
+    Mat3 R;      ///< at the step's start
+
+    /// M becomes F M. Full products of 15 x 15 would cost as much as the rest of the plug-in.
+    void apply(Mat15& M) const {
+        const Eigen::Matrix<double, 3, 15> gain =
+            force * M.middleRows<3>(kRot) - (dt * R) * M.middleRows<3>(kAccelBias);
+        M.middleRows<3>(kPos) += dt * M.middleRows<3>(kVel) + (0.5 * dt) * gain;
+        M.middleRows<3>(kVel) += gain;
+        M.middleRows<3>(kRot) =
+            (turn.transpose() * M.middleRows<3>(kRot) - dt * M.middleRows<3>(kGyroBias)).eval();
+    }
+};
+
+/// One step of the error state, attitude R at its start; then R moves on.
+void advance(const Vec3& accel, const Vec3& gyro, double dt, const GuessNoise& n, Mat3& R,
+             Transition& t) {
+    const Step step{dt, exp_so3(gyro * dt), -dt * R * hat(accel), R};
+    step.apply(t.Phi);
+    step.apply(t.Q);
+    t.Q.transposeInPlace();
+    step.apply(t.Q);
     const auto add = [&t, dt](int at, double density) {
         t.Q.diagonal().segment<3>(at).array() += density * density * dt;
     };
@@ -66,7 +78,7 @@ void step(const Vec3& accel, const Vec3& gyro, double dt, const GuessNoise& n, M
     add(kVel, n.accel);
     add(kAccelBias, n.accel_bias);
     add(kGyroBias, n.gyro_bias);
-    R = R * turn;
+    R = R * step.turn;
 }
 
 }  // namespace
@@ -94,7 +106,7 @@ Transition GuessCovariance::Impl::until(double end) const {
         while (now < to) {
             const double dt = std::min(to - now, kLongestStep);
             if (!(now + dt > now)) break;
-            step(accel, gyro, dt, noise, attitude, t);
+            advance(accel, gyro, dt, noise, attitude, t);
             now += dt;
         }
     };
