@@ -40,6 +40,8 @@ class RunRecord(BaseModel):
 
     Attributes:
         status: complete, diverged (poses no longer finite or plausible), failed, interrupted.
+        start_offset_s: how much later than its first message the recording was begun;
+            start_stamp_ns: that moment, None without an offset.
         wall_s: whole run; read_s: reading and decoding; host_s: inside the estimator.
         accepted_share: accepted / offered correspondences over all scans.
         inputs_hash: SHA-256 over the names of the input files.
@@ -55,6 +57,8 @@ class RunRecord(BaseModel):
     host: str
     params: dict[str, str]
     threads: int
+    start_offset_s: float = 0.0
+    start_stamp_ns: int | None = None
     scans: ScanCounts
     imu_read: int = 0
     health: dict[str, int] = {}

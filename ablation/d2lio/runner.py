@@ -5,6 +5,7 @@
 from __future__ import annotations
 
 import hashlib
+import math
 import resource
 import sys
 import time
@@ -17,7 +18,7 @@ import numpy as np
 
 from d2lio import __version__
 from d2lio.datasets import ImuBlock, Source, timed_events
-from d2lio.datasets.events import Event
+from d2lio.datasets.events import NS_PER_S, Event
 from d2lio.errors import ConfigError
 from d2lio.hosts import Host, ScanResult, load_host
 from d2lio.output import OutputDir, ResultWriter
@@ -38,7 +39,8 @@ class RunOptions:
         rejection, degeneracy: mode and method; None leaves the host's default.
         params: further host parameters as texts, these win.
         threads: of the host.
-        max_scans: stop after this many scans were read; None reads all.
+        max_scans: stop after this many scans were fed; None reads all.
+        start_offset_s: begin so much after the first message; what comes before is left out.
         command: recorded in run.json.
     """
 
@@ -48,6 +50,7 @@ class RunOptions:
     params: dict[str, str] = field(default_factory=dict)
     threads: int = 1
     max_scans: int | None = None
+    start_offset_s: float = 0.0
     command: list[str] = field(default_factory=list)
 
 
@@ -75,6 +78,8 @@ class _Tally:
     last_stamp: int = 0
     last_position: np.ndarray | None = None
     scans_fed: int = 0
+    scans_before_start: int = 0
+    start_stamp: int | None = None
     read_s: float = 0.0
     host_s: float = 0.0
     diverged: str = ""
@@ -109,6 +114,26 @@ class _Tally:
         if self.last_position is not None:
             self.path_m += float(np.linalg.norm(position - self.last_position))
         self.last_position = position
+
+
+def _begin_later(events: Iterator[Event], offset_s: float, tally: _Tally) -> Iterator[Event]:
+    """The events from `offset_s` after the first one on; notes where that is."""
+    for event in events:
+        first = int(event.stamps[0]) if isinstance(event, ImuBlock) else event.stamp
+        if tally.start_stamp is None:
+            tally.start_stamp = first + round(offset_s * NS_PER_S)
+        if first >= tally.start_stamp:
+            yield event
+        elif not isinstance(event, ImuBlock):
+            tally.scans_before_start += 1
+        elif event.stamps[-1] >= tally.start_stamp:
+            yield _samples_from(event, tally.start_stamp)
+
+
+def _samples_from(block: ImuBlock, start: int) -> ImuBlock:
+    keep = block.stamps >= start
+    orientation = None if block.orientation is None else block.orientation[keep]
+    return ImuBlock(block.stamps[keep], block.gyro[keep], block.accel[keep], orientation)
 
 
 def _timed_next(events: Iterator[Event], tally: _Tally) -> Event | None:
@@ -149,6 +174,8 @@ def _feed(
             progress(sum(tally.health.values()), total)
 
     events = timed_events(source.reader, log_times=source.log_times)
+    if options.start_offset_s > 0.0:
+        events = _begin_later(events, options.start_offset_s, tally)
     while (event := _timed_next(events, tally)) is not None:
         if isinstance(event, ImuBlock):
             host.add_imu(event.stamps, event.gyro, event.accel, event.orientation)
@@ -180,6 +207,8 @@ def run(
     """
     if options.threads < 1:
         raise ConfigError("threads", options.threads, ">= 1")
+    if not 0.0 <= options.start_offset_s < math.inf:
+        raise ConfigError("start-offset", options.start_offset_s, ">= 0 (s)")
     make_host = load_host(options.host)
     params = all_params(
         source.config, options.host, options.rejection, options.degeneracy, options.params
@@ -221,6 +250,8 @@ def _record(
         host=options.host,
         params=_effective(options.host, params),
         threads=options.threads,
+        start_offset_s=options.start_offset_s,
+        start_stamp_ns=tally.start_stamp,
         scans=_scan_counts(notes.counts, tally, host.counts()),
         imu_read=notes.counts.get("imu_read", 0),
         health=dict(tally.health),
@@ -252,10 +283,13 @@ def _effective(host: str, params: dict[str, str]) -> dict[str, str]:
 
 
 def _scan_counts(reader: dict[str, int], tally: _Tally, host: dict[str, int]) -> ScanCounts:
-    read = max(reader.get("scans_read", 0), tally.scans_fed)
+    taken = tally.scans_fed + tally.scans_before_start
+    read = max(reader.get("scans_read", 0), taken)
     processed = tally.poses
     dropped = {k: v for k, v in reader.items() if k.startswith(("scans_empty", "scans_bad"))}
-    unread = read - tally.scans_fed - sum(dropped.values())
+    unread = read - taken - sum(dropped.values())
+    if tally.scans_before_start > 0:
+        dropped["before_start"] = tally.scans_before_start
     if unread > 0:
         dropped["beyond_max_scans"] = unread
     dropped |= {f"no_pose_{status}": n for status, n in tally.without_pose.items()}

@@ -163,3 +163,39 @@ def test_full_disk_ends_in_one_line_and_leaves_nothing(
     assert result.exit_code == 3
     assert result.stderr.splitlines()[-1].startswith("error: the disk is full")
     assert sorted(p.name for p in tmp_path.iterdir()) == before
+
+
+def test_start_offset_leaves_out_what_comes_before(
+    source: Source, tmp_path: Path, fake_host
+) -> None:
+    whole = run(source, RunOptions(host=fake_host), tmp_path / "whole")
+    later = open_source(tmp_path / "a.bag", tmp_path / "c.yaml")
+    options = RunOptions(host=fake_host, start_offset_s=0.45)
+    record = run(later, options, tmp_path / "later")
+    assert whole.start_stamp_ns is None
+    assert record.start_stamp_ns is not None
+    assert record.start_offset_s == 0.45
+    stamps = [
+        [int(row["stamp_ns"]) for row in csv.DictReader((tmp_path / n / "diagnostics.csv").open())]
+        for n in ("whole", "later")
+    ]
+    # The IMU begins 0.2 s before the first scan: scans at 0, 0.1 and 0.2 s lie before the start.
+    assert record.start_stamp_ns == START + NS // 4
+    assert record.scans.dropped["before_start"] == 3
+    assert stamps[1] == stamps[0][3:]
+    assert record.scans.read == SCANS
+    assert record.scans.processed + sum(record.scans.dropped.values()) == SCANS
+
+
+@pytest.mark.parametrize("offset", [-1.0, float("nan"), float("inf")])
+def test_start_offset_that_makes_no_sense(
+    source: Source, tmp_path: Path, fake_host, offset: float
+) -> None:
+    with pytest.raises(ConfigError, match="start-offset"):
+        run(source, RunOptions(host=fake_host, start_offset_s=offset), tmp_path / "out")
+
+
+def test_start_beyond_the_end_is_a_failed_run(source: Source, tmp_path: Path, fake_host) -> None:
+    record = run(source, RunOptions(host=fake_host, start_offset_s=1e4), tmp_path / "out")
+    assert (record.status, record.reason) == ("failed", "no scan gave a pose")
+    assert record.scans.dropped["before_start"] == SCANS

@@ -55,6 +55,9 @@ def run(
     threads: ThreadsOption = 1,
     out: Annotated[Path | None, typer.Option(help="Directory for the results.")] = None,
     max_scans: Annotated[int | None, typer.Option(min=1, help="Stop after so many.")] = None,
+    start_offset: Annotated[
+        float, typer.Option(min=0.0, help="Leave out so much at the start, s.")
+    ] = 0.0,
     stamps: Annotated[
         str | None, typer.Option(help="header, or log: times of reception (clocks differ).")
     ] = None,
@@ -74,6 +77,7 @@ def run(
             params=parse_assignments(assignments or []),
             threads=threads,
             max_scans=max_scans,
+            start_offset_s=start_offset,
             command=sys.argv[1:],
         )
         name = "_".join(filter(None, (source.name, host, rejection, degeneracy)))
