@@ -10,6 +10,7 @@
 #include "d2lio/geometry/so3.hpp"
 #include "d2lio/plugin/core.hpp"
 #include "d2lio/plugin/verdict_book.hpp"
+#include "step_control.hpp"
 
 namespace d2lio::liosam {
 namespace {
@@ -64,6 +65,7 @@ void euler_jacobian(double roll, double pitch, double* out) {
 
 struct Adapter::Impl {
     VerdictBook book;
+    StepControl steps;
     std::size_t corners = 0;
     bool degenerate = false;
 
@@ -79,6 +81,7 @@ Status Adapter::begin_scan(const ScanInput& input) {
     impl_->corners = input.corners;
     impl_->book.begin_scan(input.corners + input.surfaces);
     impl_->degenerate = false;
+    impl_->steps.begin();
     if (input.covariance != nullptr) {
         const Eigen::Map<const Mat6> P(input.covariance);
         core().P_r = P.topLeftCorner<3, 3>();
@@ -173,6 +176,11 @@ Status Adapter::condition(const double* pose, double variance, const NormalEquat
     Mat6Map(equations.AtA) = J.transpose() * AtA * J;
     Vec6Map(equations.Atb) = J.transpose() * Atb;
     return Status::kOk;
+}
+
+double Adapter::step_factor(const double* step, const double* AtA) {
+    if (core().gates().host_gates()) return 1.0;
+    return impl_->steps.factor(Eigen::Map<const Vec6>(step), Eigen::Map<const Mat6>(AtA));
 }
 
 bool Adapter::degenerate() const { return impl_->degenerate; }

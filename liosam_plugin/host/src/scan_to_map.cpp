@@ -160,7 +160,8 @@ bool ScanToMap::step(const MatchInput& input, Pose& T, MatchReport& report) {
     adapter_.condition_tangent({T.R.data(), T.t.data()}, options_.variance,
                                {AtA.data(), Atb.data()});
     report.degenerate = adapter_.degenerate() || report.remapped;
-    const Vec6 d = keep_ * AtA.ldlt().solve(Atb);
+    const Vec6 whole = AtA.ldlt().solve(Atb);
+    const Vec6 d = adapter_.step_factor(whole.data(), AtA.data()) * keep_ * whole;
     const Pose next{renormalise_so3(T.R * exp_so3(d.head<3>())), T.t + d.tail<3>()};
     if (!next.R.allFinite() || !next.t.allFinite()) {
         report.status = MatchStatus::kNumericalFailure;

@@ -84,6 +84,13 @@ struct Equations {
     }
 };
 
+/// The step of iteration i of a scan whose correspondences flip.
+Matrix to_and_fro(int i) {
+    Matrix step(1);
+    step.at<float>(4, 0) = i % 2 == 0 ? 0.01F : -0.01F;
+    return step;
+}
+
 constexpr std::array<float, 6> kPose{0.02F, -0.03F, 1.1F, 5.F, 6.F, 0.5F};
 
 void feed_imu(Host& host, double from, double to) {
@@ -120,7 +127,11 @@ TEST(UpstreamGlue, WithoutParametersLeavesEverythingToUpstream) {
     const Equations before = eq;
     glue.condition(kPose.data(), eq.AtA, eq.Atb);
     EXPECT_TRUE(eq.AtA == before.AtA && eq.Atb == before.Atb);
-    glue.restore(eq.AtA, eq.Atb);
+    for (int i = 0; i < 12; ++i) {
+        Matrix step = to_and_fro(i), same = step;
+        glue.restore(eq.AtA, eq.Atb, step);
+        EXPECT_TRUE(step == same);
+    }
     EXPECT_TRUE(eq.AtA == before.AtA && eq.Atb == before.Atb);
     EXPECT_FALSE(glue.has_prior());
     EXPECT_TRUE(glue.end_scan(kPose.data(), true));
@@ -220,12 +231,32 @@ TEST(UpstreamGlue, ThePriorIsInTheSolveButNotInTheEigenvalueTest) {
     EXPECT_TRUE(glue.has_prior());
     EXPECT_GT(eq.AtA.at<float>(3, 3), 100.F * Equations().AtA.at<float>(3, 3));
     EXPECT_LT(eq.Atb.at<float>(3, 0), 0.F);  // back to the guess
-    glue.restore(eq.AtA, eq.Atb);
-    EXPECT_TRUE(eq.AtA == before.AtA && eq.Atb == before.Atb);
+    Matrix step = to_and_fro(0), same = step;
+    glue.restore(eq.AtA, eq.Atb, step);
+    EXPECT_TRUE(eq.AtA == before.AtA && eq.Atb == before.Atb && step == same);
     EXPECT_TRUE(glue.end_scan(moved.data(), false));  // our verdict on the scan's own rows
     const auto messages = test::published(node_of(host));
     ASSERT_EQ(messages.size(), 2U);
     EXPECT_NEAR(test::stamp_of(messages[1].second), 10.4, 1e-6);
+}
+
+/// Upstream's loop ends when a step is small enough: one that steps to and fro must come there.
+TEST(UpstreamGlue, AModeShortensTheStepsOfAScanThatOscillates) {
+    Host host;
+    test::set(node_of(host), "rejection/mode", "none");
+    UpstreamGlue glue;
+    glue.configure(host);
+    begin_third_scan(glue, host, kPose.data());
+    float last = 0.F;
+    for (int i = 0; i < 15; ++i) {
+        Equations eq;
+        glue.condition(kPose.data(), eq.AtA, eq.Atb);
+        Matrix step = to_and_fro(i);
+        glue.restore(eq.AtA, eq.Atb, step);
+        last = std::abs(step.at<float>(4, 0));
+        EXPECT_TRUE(i >= 6 || last == 0.01F) << i;
+    }
+    EXPECT_LT(last, 1e-4F);
 }
 
 /// A pose that is no number cannot be conditioned: upstream's step stays as it is.

@@ -138,10 +138,18 @@ class UpstreamGlue {
         write(A, b, AtA, Atb);
     }
 
-    /// The normal equations as the scan alone made them, for upstream's eigenvalue test.
+    /// The normal equations as the scan alone made them, for upstream's eigenvalue test; a shorter
+    /// step (6 x 1) where the scan has begun to step to and fro.
     template <class Mat>
-    void restore(Mat& AtA, Mat& Atb) {
+    void restore(Mat& AtA, Mat& Atb, Mat& step) {
         if (changed_) write(kept_A_, kept_b_, AtA, Atb);
+        if (!adapter_.rejects()) return;
+        double A[36], d[6];
+        for (int i = 0; i < 36; ++i) A[i] = static_cast<double>(kept_A_[i]);
+        for (int i = 0; i < 6; ++i) d[i] = static_cast<double>(step.template at<float>(i, 0));
+        const auto factor = static_cast<float>(adapter_.step_factor(d, A));
+        if (factor == 1.0F) return;
+        for (int i = 0; i < 6; ++i) step.template at<float>(i, 0) *= factor;
     }
 
     /// Whether a prior has decided on the weak directions of this step.
