@@ -24,7 +24,8 @@ function(d2lio_upstream_library name host)
   add_library(${name} STATIC ${sources})
   # Overrides what upstream sets for its folder (C++14): the last -std counts.
   set_target_properties(${name} PROPERTIES CXX_STANDARD 17 POSITION_INDEPENDENT_CODE ON)
-  set_property(TARGET ${name} PROPERTY COMPILE_OPTIONS -std=c++17 -O3 -ffp-contract=off)
+  # NDEBUG: upstreams build without it, and an assertion of Eigen's must not end a robot's node.
+  set_property(TARGET ${name} PROPERTY COMPILE_OPTIONS -std=c++17 -O3 -DNDEBUG -ffp-contract=off)
   target_include_directories(${name} PUBLIC
                              "${D2LIO_UPSTREAM_ROOT}/common/include"
                              "${D2LIO_UPSTREAM_ROOT}/${host}_plugin/adapter/include")
