@@ -54,7 +54,8 @@ class _Strict(BaseModel):
 class LidarInfo(_Strict):
     """The lidar stream. Ranges in metres, ``time_unit`` is the unit of ``time_field``.
 
-    ``time_field`` is null where the points carry no time of their own.
+    ``time_field`` is null where the points carry no time of their own. ``synchronised``: the points
+    are motion compensated to the stamp already, whatever their times say.
     """
 
     topic: Text
@@ -65,6 +66,7 @@ class LidarInfo(_Strict):
     max_range_m: Positive
     time_field: Text | None
     time_unit: Literal["s", "ms", "us", "ns"]
+    synchronised: bool = False
 
     @model_validator(mode="after")
     def _ordered(self) -> LidarInfo:
@@ -128,7 +130,8 @@ class Sequence(_Strict):
     def save(self, directory: Path | str) -> Path:
         """Write ``sequence.yaml`` into ``directory`` and return its path."""
         file = Path(directory) / FILE_NAME
-        text = yaml.safe_dump(self.model_dump(), sort_keys=False, default_flow_style=None)
+        data = self.model_dump(exclude_defaults=True)
+        text = yaml.safe_dump(data, sort_keys=False, default_flow_style=None)
         file.write_text(text, encoding="utf-8")
         self._root = file.parent
         return file

@@ -138,7 +138,7 @@ class SourceConfig(_Strict):
                 max_range_m=lidar.max_range_m,
                 time_field=lidar.time_field,
                 time_unit=lidar.time_unit if lidar.time_field else "auto",
-                synchronised=lidar.time_field is None,
+                synchronised=lidar.synchronised or lidar.time_field is None,
             ),
             imu=ImuSource(topic=imu.topic, rate_hz=imu.rate_hz),
         )

@@ -10,6 +10,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 import yaml
+from d2lio.datasets.config import SourceConfig
 from d2lio.errors import ConfigError, DataError
 from d2lio.sequence import Sequence
 
@@ -69,6 +70,15 @@ def test_round_trip(tmp_path: Path) -> None:
     assert sequence.bag_path == tmp_path / "data.bag"
     assert yaml.safe_load((tmp_path / "sequence.yaml").read_text()) == GOOD
     np.testing.assert_array_equal(sequence.extrinsic, np.eye(4))
+
+
+def test_compensated_clouds_can_be_declared(tmp_path: Path) -> None:
+    hints = {
+        SourceConfig.from_sequence(load(tmp_path, data)).time_hint().synchronised
+        for data in (changed("lidar.synchronised", True), changed("lidar.time_field", "x"))
+    }
+    assert hints == {True, False}
+    assert load(tmp_path, changed("lidar.synchronised", True)).lidar.synchronised
 
 
 @pytest.mark.parametrize("key", KEYS)
