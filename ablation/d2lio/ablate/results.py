@@ -148,6 +148,18 @@ def save(out: Path, rows: Iterable[ResultRow], timings: Iterable[TimingRow]) -> 
     _write(out / TIMINGS_FILE, _timing_types(costs), costs)
 
 
+def write_text(file: Path, text: str) -> None:
+    """Writes a file in one go.
+
+    Raises:
+        DataError: cannot be written.
+    """
+    try:
+        _replace(file, text.encode())
+    except OSError as err:
+        raise DataError(f"{file}: cannot be written: {err.strerror}") from None
+
+
 def load(out: Path) -> Results:
     """Reads suite.yaml, results.csv and timings.csv of an ablation.
 

@@ -10,7 +10,7 @@ from typing import Annotated
 import typer
 
 from d2lio import __version__
-from d2lio.cli import commands_datasets, commands_demo, commands_run
+from d2lio.cli import commands_ablate, commands_datasets, commands_demo, commands_run
 from d2lio.cli.common import EXIT_BUG, EXIT_CODES, EXIT_INTERRUPTED, crash_report
 
 app = typer.Typer(
@@ -25,6 +25,7 @@ app.command("evaluate")(commands_run.evaluate)
 app.command("simulate")(commands_run.simulate)
 app.command("params")(commands_run.params)
 app.command("demo")(commands_demo.demo)
+app.command("ablate")(commands_ablate.ablate)
 app.add_typer(commands_datasets.app)
 
 
