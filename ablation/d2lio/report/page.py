@@ -4,28 +4,15 @@
 
 from __future__ import annotations
 
-import json
 import os
 from html import escape
-from importlib.resources import files
 from pathlib import Path
 from typing import Any
 
 from d2lio import __version__
 from d2lio.demo import FAIL_PERCENT, RESULTS_FILE, DemoResult, Scene, cell
 from d2lio.report import figures
-
-
-def _script_json(value: Any) -> str:
-    """JSON that can stand inside a script element."""
-    text = json.dumps(value, ensure_ascii=False, allow_nan=False, separators=(",", ":"))
-    return text.replace("</", "<\\/").replace("<!--", "<\\!--")
-
-
-def _plotly() -> str:
-    from plotly.offline import get_plotlyjs
-
-    return get_plotlyjs().replace("</script", "<\\/script")
+from d2lio.report.embed import asset, fill, script_json, write_page
 
 
 def _table(result: DemoResult) -> str:
@@ -104,7 +91,6 @@ def _scene(result: DemoResult, scene: Scene) -> dict[str, Any]:
 
 def write_report(result: DemoResult, path: Path) -> None:
     """Writes the page in one go."""
-    template = files("d2lio.report").joinpath("template.html").read_text(encoding="utf-8")
     scenes = [_scene(result, scene) for scene in result.scenes]
     values = {
         "VERSION": escape(__version__),
@@ -113,13 +99,7 @@ def write_report(result: DemoResult, path: Path) -> None:
         "NOTE": escape(result.note and f"Left out: {result.note}."),
         "FAILURES": _failures(result),
         "FILES": _files(result),
-        "VARIANTS": _script_json(figures.variant_buttons(result)),
-        "SCENES": _script_json(scenes),
-        "PLOTLY": _plotly(),
+        "VARIANTS": script_json(figures.variant_buttons(result)),
+        "SCENES": script_json(scenes),
     }
-    page = template
-    for name, text in values.items():
-        page = page.replace(f"@@{name}@@", text)
-    partial = path.with_name(f".{path.name}.tmp")
-    partial.write_text(page, encoding="utf-8")
-    os.replace(partial, path)
+    write_page(path, fill(asset("template.html"), values))

@@ -1,0 +1,111 @@
+# SPDX-FileCopyrightText: 2026 D2-LIO contributors
+# SPDX-License-Identifier: BSD-3-Clause
+"""Curves of a run, read from the files it left."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from contextlib import suppress
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import numpy as np
+
+from d2lio.datasets.events import NS_PER_S
+from d2lio.errors import DataError
+from d2lio.metrics.matching import match
+from d2lio.metrics.tum import Trajectory, finite, read_tum
+from d2lio.record import DIAGNOSTICS_FILE, TRAJECTORY_FILE
+from d2lio.report.diagnostics import read_diagnostics
+
+TRUTH_FILE = "truth.tum"
+MIN_PAIRS = 3  # fewer positions give no alignment
+OUTCOMES = {
+    "accepted": "accepted",
+    "rejected_few_neighbours": "few neighbours",
+    "rejected_far_neighbours": "far neighbours",
+    "rejected_threshold": "threshold",
+    "rejected_singular_plane": "singular plane",
+    "rejected_plane_fit": "plane fit",
+    "rejected_residual": "residual",
+}
+
+Array = np.ndarray
+
+
+@dataclass(slots=True)
+class RunSeries:
+    """What the figures need of one run; arrays are empty where it left nothing.
+
+    Attributes:
+        truth: m [M, 3].
+        t, path, error: of the matched poses: s [N] from the truth's begin, m [N, 3] aligned to the
+            truth (SE(3), least squares), m [N].
+        t_scan, lambda_t, lambda_r: per processed scan: s [K], smallest eigenvalue of each block.
+        shares: of the correspondences offered, by outcome, [0, 1].
+    """
+
+    truth: Array = field(default_factory=lambda: np.empty((0, 3)))
+    t: Array = field(default_factory=lambda: np.empty(0))
+    path: Array = field(default_factory=lambda: np.empty((0, 3)))
+    error: Array = field(default_factory=lambda: np.empty(0))
+    t_scan: Array = field(default_factory=lambda: np.empty(0))
+    lambda_t: Array = field(default_factory=lambda: np.empty(0))
+    lambda_r: Array = field(default_factory=lambda: np.empty(0))
+    shares: dict[str, float] = field(default_factory=dict)
+
+
+def read_series(directory: Path) -> RunSeries:
+    """The curves of a run; a missing or broken file leaves its curves empty (the run failed)."""
+    series = RunSeries()
+    try:
+        truth = read_tum(directory / TRUTH_FILE)
+    except DataError:
+        return series
+    series.truth = truth.positions
+    start = int(truth.stamps[0])
+    with suppress(DataError):
+        _add_path(series, truth, read_tum(directory / TRAJECTORY_FILE))
+    with suppress(DataError):
+        _add_diagnostics(series, read_diagnostics(directory / DIAGNOSTICS_FILE), start)
+    return series
+
+
+def _add_path(series: RunSeries, truth: Trajectory, estimate: Trajectory) -> None:
+    good = estimate.select(finite(estimate))
+    if len(good) < MIN_PAIRS or len(truth) < MIN_PAIRS:
+        return
+    pair = match(truth, good)
+    if len(pair.truth) < MIN_PAIRS:
+        return
+    series.t = (pair.truth.stamps - truth.stamps[0]) / NS_PER_S
+    series.path = align(pair.estimate.positions, pair.truth.positions)
+    series.error = np.linalg.norm(series.path - pair.truth.positions, axis=1)
+
+
+def align(points: Array, target: Array) -> Array:
+    """Points [N, 3] moved rigidly onto their partners [N, 3] (Umeyama 1991, without scale)."""
+    center, goal = points.mean(axis=0), target.mean(axis=0)
+    U, _, Vt = np.linalg.svd((target - goal).T @ (points - center))
+    handed = np.diag([1.0, 1.0, np.sign(np.linalg.det(U @ Vt))])
+    return (points - center) @ (U @ handed @ Vt).T + goal
+
+
+def _add_diagnostics(series: RunSeries, columns: Mapping[str, Array], start_ns: int) -> None:
+    stamps = columns.get("stamp_ns", np.empty(0))
+    if not len(stamps):
+        return
+    # LIO-SAM skips every other scan on purpose.
+    kept = columns["status"] != "skipped" if "status" in columns else np.full(len(stamps), True)
+    series.t_scan = (stamps[kept] - start_ns) / NS_PER_S
+    for block in ("t", "r"):
+        values = columns.get(f"lambda_{block}_1")
+        if values is not None and values.dtype.kind == "f":
+            setattr(series, f"lambda_{block}", values[kept])
+    offered = float(np.nansum(columns["offered"])) if "offered" in columns else 0.0
+    if offered > 0.0:
+        series.shares = {
+            label: float(np.nansum(columns[key])) / offered
+            for key, label in OUTCOMES.items()
+            if key in columns
+        }
