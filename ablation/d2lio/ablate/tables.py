@@ -123,7 +123,7 @@ def _block(results: Results, group: str, variants: list[Variant]) -> Table:
     shown = [v for v in variants if v.id in present]
     sequences = [Header(s.name, s.name, s.dataset) for s in suite.sequences if s.name in names]
     columns = [Header(v.id, v.label, "" if group else _host(v)) for v in shown]
-    baseline = _baseline(suite, shown)
+    baseline = _baseline(suite, shown, in_groups=bool(group))
     cells = _cells(runs, sequences, columns, baseline)
     _add_paper(cells, suite, {v.id: v for v in shown})
     pool = _pooled(cells, sequences, columns, baseline)
@@ -141,11 +141,13 @@ def _host(variant: Variant) -> str:
     return variant.group or SHORT_TITLES.get(variant.host or "", variant.host or "imported")
 
 
-def _baseline(suite: Suite, variants: list[Variant]) -> str:
+def _baseline(suite: Suite, variants: list[Variant], in_groups: bool) -> str:
     """The suite's baseline, or in another group the variant of the same title or settings."""
     if suite.baseline is None:
         return ""
     wanted = suite.variant(suite.baseline)
+    if not in_groups:
+        return wanted.id if wanted in variants else ""
     alike = (
         lambda v: v.id == wanted.id,
         lambda v: v.label == wanted.label,

@@ -32,6 +32,17 @@
     return [low - margin, high + margin];
   }
 
+  // Ticks of a logarithmic axis: 1, 2 and 5 of each decade where they are few, else decades.
+  function logAxis(title, values, more) {
+    const known = values.filter((v) => v > 0), axis = Object.assign({ title: title, type: "log" }, more);
+    const [low, high] = known.length ? span(known).map(Math.log10) : [0, 1], ticks = [];
+    for (let k = Math.floor(low); k <= Math.ceil(high); k += 1) {
+      for (const digit of high - low < 3 ? [1, 2, 5] : [1]) { ticks.push(Number((digit + "e" + k))); }
+    }
+    return Object.assign(axis, { tickmode: "array", tickvals: ticks, ticktext: ticks.map((v) =>
+      (v >= 1e4 || v < 1e-3 ? v.toExponential(0).replace("e+", "e") : String(v))) });
+  }
+
   function line(variant, x, y, more) {
     const v = meta.variants[variant];
     return Object.assign({
@@ -61,16 +72,19 @@
   }
   function overTime(title, y, time, key) {
     const layout = plain(title, "time [s]", y);
-    layout.yaxis.type = "log";
-    return { data: runs().filter(([, run]) => run[key]).map(([i, run]) => line(i, decode(run[time]), decode(run[key]))), layout: layout };
+    const data = runs().filter(([, run]) => run[key]).map(([i, run]) => line(i, decode(run[time]), decode(run[key])));
+    layout.yaxis = logAxis(layout.yaxis.title, data.flatMap((trace) => trace.y));
+    return { data: data, layout: layout };
   }
   function bars(title, x, data, colours) {
     data.forEach(function (bar, i) {
       Object.assign(bar, { type: "bar", orientation: "h", marker: { color: colours[i % colours.length] } });
     });
     return { data: data, layout: plain(title, x, "", {
-      barmode: "stack", showlegend: true, yaxis: { autorange: "reversed", automargin: true, type: "category" } }) };
+      barmode: "stack", showlegend: true, legend: LEGEND, yaxis: { autorange: "reversed", automargin: true, type: "category" } }) };
   }
+
+  const LEGEND = { orientation: "h", yref: "container", y: 0, yanchor: "bottom", font: { size: 10.5 } };
 
   const figures = {
     top: () => view("Top view", "y"),
@@ -98,7 +112,7 @@
           line: { color: v.colour }, marker: { color: v.colour, size: 3 } });
       });
       return { data: data, layout: plain("Time per scan", "median of a run [ms]", "", {
-        xaxis: { title: { text: "median of a run [ms]", standoff: 6 }, type: "log", dtick: "D2" },
+        xaxis: logAxis({ text: "median of a run [ms]", standoff: 6 }, data.flatMap((trace) => trace.x)),
         yaxis: { autorange: "reversed", automargin: true, type: "category" } }) };
     },
     differences: function () {
@@ -112,9 +126,10 @@
           marker: { color: meta.variants[i].colour, size: 8, symbol: i % 5 } });
       }
       const layout = plain("Ratio to " + meta.baseline, "ATE / ATE of " + meta.baseline + ", with 95 % interval", "", {
-        scattermode: "group", showlegend: true,
+        scattermode: "group", showlegend: true, legend: LEGEND,
         shapes: [{ type: "line", x0: 1, x1: 1, y0: 0, y1: 1, yref: "paper", line: { width: 1, color: meta.truth } }] });
-      Object.assign(layout.xaxis, { type: "log", dtick: "D2" });
+      const all = meta.differences.filter((d) => shown.has(d[1])).flatMap((d) => d.slice(2).filter((v) => v !== null));
+      layout.xaxis = logAxis(layout.xaxis.title, all.concat(0.5, 2));
       layout.yaxis = { autorange: "reversed", automargin: true, type: "category" };
       return { data: data, layout: layout };
     },
@@ -137,9 +152,12 @@
         });
         data.push(trace);
       }
+      const sizes = ranges.map(([low, high]) => high - low), largest = Math.max(...sizes);
+      const ratio = { x: 1.7 * sizes[0] / largest, y: 1.7 * sizes[1] / largest, z: 1.7 * sizes[2] / largest };
+      const eye = ratio.x > ratio.y ? { x: -0.35, y: -1.25, z: 0.75 } : { x: -1.25, y: -0.35, z: 0.75 }; // across the longer side
       const axis = (name, k) => ({ title: { text: name + " [m]" }, range: ranges[k], backgroundcolor: "rgba(0,0,0,0)" });
       return { data: data, layout: { title: { text: "" }, showlegend: false, margin: { l: 0, r: 0, t: 0, b: 0 }, dragmode: "orbit",
-        uirevision: "space", scene: { aspectmode: "data", xaxis: axis("x", 0), yaxis: axis("y", 1), zaxis: axis("z", 2) } } };
+        uirevision: "space", scene: { aspectmode: "manual", aspectratio: ratio, camera: { eye: eye }, xaxis: axis("x", 0), yaxis: axis("y", 1), zaxis: axis("z", 2) } } };
     },
   };
 
@@ -181,8 +199,6 @@
   }
 
   function refresh() {
-    const s = meta.sequences[chosen.sequence];
-    byId("chosen").textContent = s.dataset;
     Charts.redraw();
     fillLists();
   }
@@ -191,7 +207,11 @@
     if (!repeats.includes(chosen.repeat)) { chosen.repeat = repeats[0]; }
     byId("repeat").replaceChildren(...repeats.map((r) => new Option("repeat " + r, r, false, r === chosen.repeat)));
   }
-  byId("sequence").append(...meta.sequences.map((s, i) => new Option(s.name, i)));
+  for (const dataset of new Set(meta.sequences.map((s) => s.dataset))) {
+    const group = dataset ? element("optgroup", undefined, { label: dataset }) : byId("sequence");
+    meta.sequences.forEach((s, i) => { if (s.dataset === dataset) { group.append(new Option(s.name, i)); } });
+    if (dataset) { byId("sequence").append(group); }
+  }
   byId("sequence").addEventListener("change", function (event) {
     chosen.sequence = Number(event.target.value);
     setRepeats();

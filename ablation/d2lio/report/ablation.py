@@ -103,13 +103,15 @@ def _block(results: Results, tables: list[Table], index: int) -> str:
     table = tables[index]
     stem = file_stems(results.suite.name, tables)[index]
     links = ", ".join(f'<a href="{TABLES_DIR}/{stem}{s}">{s[1:]}</a>' for s in FORMATS)
+    heading = f"<h3>{escape(table.title)}</h3>" if len(tables) > 1 else ""
     rules = "".join(f"<li>{escape(rule)}</li>" for rule in table.rules)
     return (
-        f'<section class="block"><h3>{escape(table.title)}</h3>'
+        f'<section class="block">{heading}'
         f'<div class="scroll"><table class="results">{_head(table)}{_body(table)}</table></div>'
         f'<p class="dim">Sort by a column\'s title; point at or tap a cell for what lies behind '
         f"it. As a file: {links}.</p>"
-        f'<details><summary>What the signs mean</summary><ul class="rules">{rules}</ul></details>'
+        f"<details open><summary>What the signs mean</summary>"
+        f'<ul class="rules">{rules}</ul></details>'
         f"</section>"
     )
 
@@ -183,7 +185,7 @@ def _shown(cell: Cell) -> str:
         small.append(f"lost, {metres(cell.stats.failed_ate)}")
     if cell.paper:
         small.append(f"paper {escape(cell.paper)}")
-    return text + "".join(f"<small>{line}</small>" for line in small)
+    return f"<b>{text}</b>" + "".join(f"<small>{line}</small>" for line in small)
 
 
 def _made(results: Results, drawn: list[Path]) -> str:
