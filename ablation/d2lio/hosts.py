@@ -11,6 +11,7 @@ from typing import Any, Protocol
 import numpy as np
 
 from d2lio.errors import ConfigError, DataError
+from d2lio.peers import PEERS
 
 REJECTION_MODES = ("off", "none", "fixed", "kiss", "point_adaptive")
 LIOSAM_MODULE = "d2lio._liosam"
@@ -112,16 +113,22 @@ HOSTS: dict[str, Callable[[], Any]] = {
 NEED_GTSAM = ("liosam", "d2lio")
 TITLES = {"fastlio": "FAST-LIO2 host", "liosam": "LIO-SAM host", "d2lio": "D²-LIO"}
 SHORT_TITLES = {"fastlio": "FAST-LIO2", "liosam": "LIO-SAM", "d2lio": "D²-LIO"}
+TITLES |= {name: peer.title for name, peer in PEERS.items()}
+SHORT_TITLES |= {name: peer.title for name, peer in PEERS.items()}
 
 
 def load_host(name: str) -> Any:
-    """The host class.
+    """The host class; for a peer (see `d2lio.peers`) what makes a host of it.
 
     Raises:
         ConfigError: unknown name; DataError: its C++ module is missing.
     """
+    if name in PEERS:
+        from d2lio.peers.host import factory
+
+        return factory(name)
     if name not in HOSTS:
-        raise ConfigError("host", name, ", ".join(HOSTS))
+        raise ConfigError("host", name, ", ".join([*HOSTS, *PEERS]))
     return HOSTS[name]()
 
 

@@ -12,6 +12,8 @@ import numpy as np
 from d2lio.datasets.config import LidarSource, ParamValue, SourceConfig
 from d2lio.errors import ConfigError
 from d2lio.hosts import NEED_GTSAM
+from d2lio.peers import PEERS
+from d2lio.peers import settings as peer_settings
 
 # Columns of LIO-SAM's range image by model. 1800 is LIO-SAM's default and what its users keep for
 # every Velodyne, the HDL-64E of KITTI included (it fires 2083 times a turn; the first of two
@@ -49,11 +51,15 @@ def ring_step_for(rings: int) -> int:
     return max(1, rings // RINGS_USED)
 
 
+def _columns(lidar: LidarSource) -> int:
+    return lidar.columns or COLUMNS.get(lidar.model.lower(), DEFAULT_COLUMNS)
+
+
 def range_image(lidar: LidarSource) -> dict[str, str]:
     """Rows and columns of LIO-SAM's range image; without `rings` the host keeps its 16 rows."""
     model = lidar.model.lower()
     params = {
-        "Horizon_SCAN": str(lidar.columns or COLUMNS.get(model, DEFAULT_COLUMNS)),
+        "Horizon_SCAN": str(_columns(lidar)),
         "columnByOrder": _text(model in LIVOX),
     }
     if lidar.rings:
@@ -72,6 +78,8 @@ def source_params(
         host: name of the estimator.
         extra: parameters that are going to be set as well; they only decide the front end here.
     """
+    if host in PEERS:  # the `host` section is for ours
+        return peer_settings.source_params(config, _columns(config.lidar))
     own = {key: _text(value) for key, value in (config.host | config.hosts.get(host, {})).items()}
     if host in NEED_GTSAM:
         front_end = (own | dict(extra or {})).get("front_end", FRONT_ENDS[host])

@@ -10,7 +10,13 @@ from typing import Annotated
 import typer
 
 from d2lio import __version__
-from d2lio.cli import commands_ablate, commands_datasets, commands_demo, commands_run
+from d2lio.cli import (
+    commands_ablate,
+    commands_datasets,
+    commands_demo,
+    commands_peers,
+    commands_run,
+)
 from d2lio.cli.common import EXIT_BUG, EXIT_CODES, EXIT_INTERRUPTED, crash_report
 
 app = typer.Typer(
@@ -27,6 +33,7 @@ app.command("params")(commands_run.params)
 app.command("demo")(commands_demo.demo)
 app.command("ablate")(commands_ablate.ablate)
 app.add_typer(commands_datasets.app)
+app.add_typer(commands_peers.app)
 
 
 def _version(value: bool) -> None:
