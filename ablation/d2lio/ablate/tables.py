@@ -5,6 +5,7 @@
 from __future__ import annotations
 
 import csv
+import textwrap
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from importlib.resources import files
@@ -341,7 +342,7 @@ def to_rich(table: Table) -> RichTable:
     from rich.markup import escape
     from rich.table import Table as RichTable
 
-    shown = RichTable(title=table.title, title_justify="left", caption_justify="left")
+    shown = RichTable(title=table.title, title_justify="left")
     shown.add_column(table.corner, no_wrap=True)
     for column in table.columns:
         shown.add_column(escape(column.title), justify="right")
@@ -357,23 +358,22 @@ def to_rich(table: Table) -> RichTable:
             text = escape(cell_text(cell))
             texts.append(f"[{style}]{text}[/{style}]" if style else text)
         shown.add_row(escape(row.title), *texts)
-    shown.caption = "\n".join(table.rules)
     return shown
 
 
 def to_text(results: Results, width: int = 120) -> str:
-    """All tables as plain text, bold as `*`."""
+    """All tables as plain text with their rules below; bold as `*`."""
     from rich.console import Console
 
-    console = Console(width=width, color_system=None, record=False, force_terminal=False)
+    console = Console(width=width, color_system=None, force_terminal=False)
     parts = []
     for table in build(results):
-        marked = Table(table.title, table.corner, table.rows, table.columns, table.baseline)
-        marked.rules = [rule.replace("Bold:", "*:") for rule in table.rules]
-        for key, cell in table.cells.items():
-            text = f"*{cell.text}" if cell.bold else cell.text
-            marked.cells[key] = Cell(text, cell.paper, stats=cell.stats)
+        cells = {
+            key: replace(cell, text=f"*{cell.text}", bold=False) if cell.bold else cell
+            for key, cell in table.cells.items()
+        }
         with console.capture() as capture:
-            console.print(to_rich(marked))
-        parts.append(capture.get())
+            console.print(to_rich(replace(table, cells=cells)))
+        rules = (textwrap.fill(rule.replace("Bold:", "*:"), width) for rule in table.rules)
+        parts.append("\n".join([capture.get().rstrip("\n"), *rules]) + "\n")
     return "\n".join(parts)

@@ -84,7 +84,7 @@
       barmode: "stack", showlegend: true, legend: LEGEND, yaxis: { autorange: "reversed", automargin: true, type: "category" } }) };
   }
 
-  const LEGEND = { orientation: "h", yref: "container", y: 0, yanchor: "bottom", font: { size: 10.5 } };
+  const LEGEND = { orientation: "h", yref: "container", y: 0, yanchor: "bottom", traceorder: "normal", font: { size: 10.5 } };
 
   const figures = {
     top: () => view("Top view", "y"),
@@ -186,8 +186,12 @@
   const filesOf = (run) => run.files.flatMap((k, n) => (n ? [" ", link(run, meta.files[k])] : [link(run, meta.files[k])]));
   const ate = (run) => (run.ate === null ? "" : run.ate < 10 ? run.ate.toFixed(3) : run.ate.toFixed(1));
   const lists = {
-    failures: () => listing(["sequence", "repeat", "variant", "reason", "ATE [m]", "files"], meta.runs.filter((r) => r.reason !== "").map((r) =>
-      [meta.sequences[r.sequence].name, String(r.repeat), meta.variants[r.variant].title, r.reason, ate(r), filesOf(r)])),
+    failures: function () {
+      const failed = meta.runs.filter((r) => r.reason !== "");
+      if (!failed.length) { return element("p", "No run failed."); }
+      return listing(["sequence", "repeat", "variant", "reason", "ATE [m]", "files"], failed.map((r) =>
+        [meta.sequences[r.sequence].name, String(r.repeat), meta.variants[r.variant].title, r.reason, ate(r), filesOf(r)]));
+    },
     files: () => listing(["variant", "ATE [m]", "files"],
       meta.runs.filter((r) => r.sequence === chosen.sequence && r.repeat === chosen.repeat).map((r) =>
         [meta.variants[r.variant].title, r.reason ? "failed" : ate(r), filesOf(r)])),

@@ -5,6 +5,7 @@
 from __future__ import annotations
 
 import math
+from contextlib import suppress
 from datetime import UTC, datetime
 from html import escape
 from itertools import groupby
@@ -13,6 +14,8 @@ from pathlib import Path
 from d2lio import __version__
 from d2lio.ablate.results import RESULTS_FILE, SUITE_FILE, TIMINGS_FILE, Results
 from d2lio.ablate.tables import POOLED_ID, Cell, Header, Table, build, metres
+from d2lio.errors import DataError
+from d2lio.record import RunRecord
 from d2lio.report import payload
 from d2lio.report.embed import asset, fill, script_json, write_page
 from d2lio.report.exports import FORMATS, TABLES_DIR, file_stems, write_tables
@@ -79,9 +82,22 @@ def _summary(results: Results, failures: int) -> str:
 
 
 def _with_prior(results: Results) -> str:
-    present = {row.variant for row in results.rows if row.degeneracy in ("paper", "remap")}
-    titles = [payload.title_of(results, v.id) for v in results.suite.variants if v.id in present]
-    return f"With the prior or remapping: {', '.join(titles)}." if titles else ""
+    found = [
+        payload.title_of(results, variant.id)
+        for variant in results.suite.variants
+        if _method(results, variant.id) not in ("", "none")
+    ]
+    return f"With the prior or remapping: {', '.join(found)}." if found else ""
+
+
+def _method(results: Results, variant: str) -> str:
+    """The degeneracy method that a variant ran with, the host's own where the suite is silent."""
+    own = [row for row in results.rows if row.variant == variant]
+    for row in own:
+        with suppress(DataError):
+            record = RunRecord.load(results.out / row.directory)
+            return record.params.get("degeneracy.method", "")
+    return own[0].degeneracy if own else ""
 
 
 def _about_differences(tables: list[Table]) -> str:

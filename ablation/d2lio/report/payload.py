@@ -99,7 +99,8 @@ def _runs(
     names: dict[str, int] = {}
     runs = []
     for row in results.rows:
-        there = [f for f in FILES if row.directory and (results.out / row.directory / f).exists()]
+        place = results.out / row.directory
+        there = [f for f in FILES if row.directory and _has_content(place / f)]
         runs.append(
             {
                 "sequence": places[row.sequence],
@@ -112,6 +113,13 @@ def _runs(
             }
         )
     return list(names), runs
+
+
+def _has_content(file: Path) -> bool:
+    try:
+        return file.stat().st_size > 0
+    except OSError:
+        return False
 
 
 def _number(value: float | None) -> float | None:
