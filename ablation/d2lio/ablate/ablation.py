@@ -17,7 +17,7 @@ from d2lio.ablate.cell import RUNS, Outcome, Scores, finished, result_row, timin
 from d2lio.ablate.execute import SCRATCH
 from d2lio.ablate.plan import Plan, make_plan
 from d2lio.ablate.results import Results
-from d2lio.ablate.schedule import LocalPool, Pool, Tally, Watcher, carry_out
+from d2lio.ablate.schedule import LocalPool, Pool, Tally, Watcher, carry_out, remove_sequence
 from d2lio.ablate.sequences import SEQUENCES
 from d2lio.ablate.suite import Suite
 from d2lio.errors import DataError
@@ -84,6 +84,8 @@ def _carry_out(
     plan: Plan, done: dict[str, Outcome], out: Path, options: AblateOptions, watcher: Watcher
 ) -> Tally:
     if len(done) == len(plan.cells):
+        for group in plan.groups if not options.keep_sequences else []:
+            remove_sequence(group)
         return Tally(done)
     pool = _pool(out, options)
     try:

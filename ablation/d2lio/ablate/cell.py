@@ -28,7 +28,7 @@ class CellSpec(BaseModel):
         source: sequence directory or recording; where it lies does not matter to the result.
         origin: what the source is: the simulation's parameters, or names and sizes of files.
         imported: TUM file instead of a run; `imported_hash` is its SHA-256.
-        version: of this package.
+        version: of this package; peer_version: of the package behind a peer.
     """
 
     model_config = ConfigDict(frozen=True, extra="forbid")
@@ -49,6 +49,7 @@ class CellSpec(BaseModel):
     limits: Limits = Limits()
     threads: int = 1
     version: str
+    peer_version: str = ""
 
     @property
     def label(self) -> str:

@@ -22,8 +22,11 @@ from typing import Any
 import psutil
 
 from d2lio.ablate.cell import CELL_FILE, LOG_FILE, CellSpec, Outcome, Scores, finished
-from d2lio.ablate.server import ERROR_FILE, end_group
+from d2lio.ablate.server import ERROR_FILE, end_group, load_plugins
 from d2lio.ablate.suite import Limits
+from d2lio.errors import DataError
+from d2lio.hosts import load_host
+from d2lio.peers import PEERS, environments
 
 TICK_S = 0.1  # between looks at the clock and the wish to stop
 MEMORY_TICK_S = 0.5  # between looks at memory, which cost milliseconds
@@ -192,6 +195,22 @@ def close_slots() -> None:
         slot.close()
 
 
+def host_missing(name: str) -> str | None:
+    """Why a host or peer cannot be run on this machine; None where it can.
+
+    Raises:
+        ConfigError: no such host.
+    """
+    load_plugins()
+    try:
+        load_host(name)
+        if name in PEERS:
+            environments.interpreter(PEERS[name])
+    except DataError as err:
+        return str(err)
+    return None
+
+
 def execute(
     spec_data: dict[str, Any], out: str, stop: threading.Event | None = None
 ) -> dict[str, Any]:
@@ -206,8 +225,11 @@ def execute(
     target = Path(out) / spec.directory
     if (done := finished(Path(out), spec)) is not None:
         return done.model_dump()
+    why = None if spec.host is None else host_missing(spec.host)
     if not Path(spec.source).exists():
-        raise NotCarriedOutError(f"{spec.source}: not there")
+        why = f"{spec.source}: not there"
+    if why is not None:  # on this machine
+        raise NotCarriedOutError(why)
     with _working_directory(target) as work:
         request = {"job": "cell", "spec": spec.model_dump(mode="json"), "work": str(work)}
         ended = _slot(spec.threads).run({**request, "log": LOG_FILE}, spec.limits, stop)

@@ -10,10 +10,11 @@ from pathlib import Path
 
 from d2lio import __version__
 from d2lio.ablate.cell import CellSpec, run_directory, spec_of
+from d2lio.ablate.execute import host_missing
 from d2lio.ablate.sequences import Origin, find_recorded, recorded, simulated
 from d2lio.ablate.suite import Suite, SuiteSequence, Variant
 from d2lio.errors import ConfigError, DataError
-from d2lio.hosts import load_host
+from d2lio.peers import PEERS
 
 TUM_SUFFIXES = (".tum", ".txt")
 
@@ -114,11 +115,7 @@ def _missing(variant: Variant, imports: dict[str, Path]) -> str | None:
     if variant.import_ is not None:
         absent = variant.import_ not in imports
         return f"no --import {variant.import_}=DIR" if absent else None
-    try:
-        load_host(variant.host or "")
-    except DataError as err:
-        return str(err)
-    return None
+    return host_missing(variant.host or "")
 
 
 def _recordings(suite: Suite, data: Path | None, notes: list[str]) -> dict[str, Path]:
@@ -176,6 +173,7 @@ def _cells(
                 limits=suite.limits,
                 threads=threads,
                 version=__version__,
+                peer_version=PEERS[variant.host].version if variant.host in PEERS else "",
             )
         )
     return cells

@@ -138,6 +138,12 @@ def carry_out(
     return loop.tally
 
 
+def remove_sequence(group: Group) -> None:
+    """Takes a simulated sequence off the disk."""
+    if group.origin.simulation is not None:
+        shutil.rmtree(group.origin.path, ignore_errors=True)
+
+
 class _Loop:
     def __init__(
         self,
@@ -234,6 +240,5 @@ class _Loop:
             self._remove(part.group)
 
     def _remove(self, group: Group) -> None:
-        """Takes a simulated sequence off the disk."""
-        if not self._keep and group.origin.simulation is not None:
-            shutil.rmtree(group.origin.path, ignore_errors=True)
+        if not self._keep:
+            remove_sequence(group)
