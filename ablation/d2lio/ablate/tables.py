@@ -272,7 +272,8 @@ def _rules(table: Table, runs: Mapping[tuple[str, str], list[ResultRow]]) -> lis
     ]
     if any(cell.paper for cell in cells):
         rules.append(
-            f"After the stroke: the paper's number on the recording of that name ({PAPER_SOURCE})."
+            "Beside ours, after the stroke or in small: the paper's number on the recording of "
+            f"that name ({PAPER_SOURCE})."
         )
     if table.baseline:
         label = next(c.title for c in table.columns if c.id == table.baseline)

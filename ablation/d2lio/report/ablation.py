@@ -167,7 +167,7 @@ def _body(table: Table) -> str:
             cells = "".join(_cell(table.cell(row, column)) for column in table.columns)
             lines.append(
                 f"<tr {marks} {_marks(table, row, of_rows=True)}>"
-                f"<th>{escape(row.title)}</th>{cells}</tr>"
+                f"<th>{escape(row.title).replace('_', '_<wbr>')}</th>{cells}</tr>"
             )
             order += 2
     return f"<tbody>{''.join(lines)}</tbody>"

@@ -14,18 +14,22 @@ TRUTH = "#9a9a9a"
 STAGE_COLOURS = ("#264653", "#2f7ebc", "#7fb7d6", "#e58606", "#d1495b", "#2a9d4a", "#9b5de5")
 OUTCOME_COLOURS = ("#2a9d4a", "#264653", "#5b8ea6", "#d1495b", "#9b5de5", "#e58606", "#e9c46a")
 _MATPLOTLIB_DASHES = ("-", "--", ":", "-.", (0, (8, 3)), (0, (8, 3, 2, 3)))
+_HATCHES = ("", "////", "....", "xxxx", "----", "++++")
 
 
 @dataclass(frozen=True, slots=True)
 class Style:
-    """Of a line: colour `#rrggbb`, dash as plotly names it and as matplotlib does."""
+    """Colour `#rrggbb`; dash as plotly names it and as matplotlib does; hatch of a bar."""
 
     colour: str
     dash: str
     linestyle: str | tuple[int, tuple[int, ...]]
+    hatch: str
 
 
 def style(index: int) -> Style:
     """Of the variant with this index in its suite; six colours, then the same ones dashed."""
     dash = index // len(COLOURS) % len(DASHES)
-    return Style(COLOURS[index % len(COLOURS)], DASHES[dash], _MATPLOTLIB_DASHES[dash])
+    return Style(
+        COLOURS[index % len(COLOURS)], DASHES[dash], _MATPLOTLIB_DASHES[dash], _HATCHES[dash]
+    )

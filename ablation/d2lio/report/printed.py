@@ -7,12 +7,13 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from d2lio.ablate.results import Key, Results
-from d2lio.ablate.tables import FAILED, POOLED_ID, Table
+from d2lio.ablate.statistics import CellStats
+from d2lio.ablate.tables import FAILED, POOLED_ID, Header, Table
 from d2lio.report import palette, payload
 from d2lio.report.series import RunSeries
 
@@ -84,6 +85,16 @@ def _new(rows: int, columns: int, size: tuple[float, float]) -> tuple[Figure, li
     return figure, list(np.ravel(figure.subplots(rows, columns, squeeze=False)))
 
 
+def _grid(count: int, height: float = PANEL_INCHES[1]) -> tuple[Figure, list[Axes]]:
+    """So many panels, COLUMNS beside each other."""
+    columns = min(COLUMNS, count)
+    rows = math.ceil(count / columns)
+    figure, axes = _new(rows, columns, (PANEL_INCHES[0] * columns, height * rows + 0.5))
+    for ax in axes[count:]:
+        ax.remove()
+    return figure, axes[:count]
+
+
 def _styles(results: Results) -> dict[str, palette.Style]:
     """By variant, as the page has them."""
     present = {row.variant for row in results.rows}
@@ -113,15 +124,10 @@ def _curves(results: Results, series: Mapping[Key, RunSeries], kind: str) -> Fig
     panels = _panels(results, series, kind)
     if not panels:
         return None
-    columns = min(COLUMNS, len(panels))
-    rows = math.ceil(len(panels) / columns)
-    width, height = PANEL_INCHES
-    figure, axes = _new(rows, columns, (width * columns, height * rows + 0.5))
+    figure, axes = _grid(len(panels))
     styles = _styles(results)
-    for ax, (name, runs) in zip(axes, panels.items(), strict=False):
+    for ax, (name, runs) in zip(axes, panels.items(), strict=True):
         _panel(ax, name, runs, kind, styles)
-    for ax in axes[len(panels) :]:
-        ax.remove()
     used = dict.fromkeys(variant for runs in panels.values() for variant in runs)
     _legend(figure, results, [v for v in styles if v in used])
     return figure
@@ -202,7 +208,7 @@ def _legend(figure: Figure, results: Results, variants: Sequence[str]) -> None:
 
 
 def _ate(results: Results, table: Table) -> Figure | None:
-    """Medians as bars from the least to the greatest good run; `-` for what failed."""
+    """A panel per sequence, a bar per variant: median, and span of the good runs."""
     of_sequences = table.corner == "sequence"
     sequences, variants = table.rows, table.columns
     if not of_sequences:
@@ -211,38 +217,44 @@ def _ate(results: Results, table: Table) -> Figure | None:
     if not sequences or not variants:
         return None
     styles = _styles(results)
-    figure, (ax,) = _new(1, 1, (max(5.0, 1.0 + 0.16 * len(sequences) * (len(variants) + 2)), 3.6))
-    width = 0.84 / len(variants)
-    for k, variant in enumerate(variants):
-        for place, sequence in enumerate(sequences):
+    figure, axes = _grid(len(sequences), height=2.1)
+    for ax, sequence in zip(axes, sequences, strict=True):
+        ax.set_title(sequence.title)
+        ax.set_ylabel("ATE [m]")
+        ax.set_yscale("log")
+        ax.grid(axis="x", visible=False)
+        ax.set_xticks([])
+        ax.set_xlim(-0.6, len(variants) - 0.4)
+        for x, variant in enumerate(variants):
             keys = (sequence.id, variant.id) if of_sequences else (variant.id, sequence.id)
             cell = table.cells.get(keys)
-            x = place - 0.42 + (k + 0.5) * width
             if cell is not None and cell.stats is not None:
-                _bar(ax, x, width, cell.stats, styles[variant.id].colour)
-    ax.set_yscale("log")
-    ax.set_ylabel("ATE RMSE [m]")
-    ax.grid(axis="x", visible=False)
-    ax.set_xticks(range(len(sequences)), [s.title for s in sequences], rotation=35, ha="right")
-    ax.set_title(table.title)
-    from matplotlib.patches import Patch
-
-    handles = [Patch(color=styles[v.id].colour) for v in variants]
-    labels = [v.title for v in variants]
-    columns = max(1, int(figure.get_size_inches()[0] / 1.6))
-    figure.legend(handles, labels, loc="outside lower center", ncols=columns)
+                _bar(ax, x, cell.stats, styles[variant.id])
+    _bar_legend(figure, variants, styles)
     return figure
 
 
-def _bar(ax: Axes, x: float, width: float, stats: Any, colour: str) -> None:
+def _bar(ax: Axes, x: float, stats: CellStats, look: palette.Style) -> None:
     if stats.median is None:
-        ax.text(x, 0.02, FAILED, transform=ax.get_xaxis_transform(), ha="center", color=colour)
+        ax.text(x, 0.02, FAILED, transform=ax.get_xaxis_transform(), ha="center", color=look.colour)
         return
-    ax.bar(x, stats.median, 0.9 * width, color=colour)
+    ax.bar(x, stats.median, 0.8, color=look.colour, hatch=look.hatch, edgecolor="white")
     if stats.low is not None and stats.high is not None and stats.n > 1:
         low, high = min(stats.low, stats.median), max(stats.high, stats.median)
         error = [[stats.median - low], [high - stats.median]]
-        ax.errorbar(x, stats.median, error, color="#444444", linewidth=0.7, capsize=1.2)
+        ax.errorbar(x, stats.median, error, color="#444444", linewidth=0.8, capsize=1.5)
+
+
+def _bar_legend(
+    figure: Figure, variants: Sequence[Header], styles: Mapping[str, palette.Style]
+) -> None:
+    from matplotlib.patches import Patch
+
+    looks = [styles[v.id] for v in variants]
+    handles = [Patch(facecolor=x.colour, hatch=x.hatch, edgecolor="white") for x in looks]
+    columns = max(1, int(figure.get_size_inches()[0] / 1.9))
+    labels = [v.title for v in variants]
+    figure.legend(handles, labels, loc="outside lower center", ncols=columns)
 
 
 def _timing(results: Results) -> Figure | None:
