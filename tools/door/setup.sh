@@ -9,6 +9,10 @@
 readonly PYTHON=${D2LIO_PYTHON:-/usr/bin/python3}
 readonly DIRTY="$STAMP_DIR/venv.dirty"
 SYSTEM_PACKAGES=(build-essential cmake ninja-build libeigen3-dev libtbb-dev python3-venv python3-dev)
+# What the Python tests need beside these: ouster-sdk is linked to libGL, even where nothing is
+# drawn; reports are opened in a browser, and without a font their texts have no width.
+TEST_PACKAGES=(libgl1)
+[[ ${D2LIO_SKIP_BROWSER:-0} == 1 ]] || TEST_PACKAGES+=(chromium chromium-driver fonts-dejavu-core)
 
 # What the installed package is made of. Tests and benchmarks are not part of it.
 readonly PACKAGE_INPUTS=(

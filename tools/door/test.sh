@@ -48,7 +48,7 @@ cmd_test() {
 
     cd -- "$ROOT" # presets and test paths are the checkout's
     ((cpp)) && SYSTEM_PACKAGES+=(libgtest-dev)
-    ((python)) && SYSTEM_PACKAGES+=(libgl1) # ouster-sdk is linked to it, even where nothing is drawn
+    ((python)) && SYSTEM_PACKAGES+=("${TEST_PACKAGES[@]}")
     if ((python)); then setup_python; else setup_system; fi
 
     local reports="$REPORT_DIR/$preset"

@@ -192,6 +192,9 @@ ALL_PACKAGES = [
     "python3-dev",
     "libgtest-dev",
     "libgl1",
+    "chromium",
+    "chromium-driver",
+    "fonts-dejavu-core",
     *GTSAM_NEEDS,
     "libgtsam-dev",
 ]

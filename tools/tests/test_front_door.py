@@ -109,6 +109,28 @@ def test_sudo_is_used_by_others_than_root(door: Door) -> None:
     assert "apt" in door.calls()
 
 
+BROWSER = {"chromium", "chromium-driver", "fonts-dejavu-core"}
+
+
+@pytest.mark.parametrize(
+    ("verb", "skip", "wanted"),
+    [
+        (("test", "--python"), "0", True),
+        (("test", "--python"), "1", False),
+        (("setup",), "0", False),
+    ],
+)
+def test_python_tests_bring_a_browser(
+    door: Door, verb: tuple[str, ...], skip: str, wanted: bool
+) -> None:
+    door.install_packages(*(name for name in ALL_PACKAGES if name not in BROWSER))
+    door.fake("id", "echo 0")
+    door.run(*verb, D2LIO_SKIP_BROWSER=skip, FAKE_PYTEST="<testsuites/>")
+    installed = set(Path(door.environment["INSTALLED"]).read_text().split())
+    assert (installed >= BROWSER) == wanted
+    assert wanted or not installed & BROWSER
+
+
 # --- how it fails
 
 
