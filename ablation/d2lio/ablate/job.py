@@ -19,6 +19,7 @@ from d2lio.datasets.source import Source
 from d2lio.datasets.truth import GroundTruth, at_truth_body, read_truth, write_truth
 from d2lio.errors import DataError
 from d2lio.metrics import EvaluateOptions, Evaluation, evaluate, read_tum, tum
+from d2lio.metrics.time_shift import best_time_shift
 from d2lio.record import DIAGNOSTICS_FILE, TRAJECTORY_FILE, RunRecord
 from d2lio.report.diagnostics import read_diagnostics
 
@@ -115,15 +116,7 @@ def _score(
     outcome.matched = {name: Path(file).name for name, file in result.files.items()}
     _note_scores(outcome.scores, result)
     if curves is not None:
-        outcome.scores.best_time_shift_s = _time_shift(estimate, truth)
-
-
-def _time_shift(estimate: Path, truth: Path) -> float | None:
-    try:
-        from d2lio.metrics.time_shift import best_time_shift
-    except ImportError:
-        return None
-    return best_time_shift(estimate, truth)
+        outcome.scores.best_time_shift_s = best_time_shift(estimate, truth)
 
 
 def _note_scores(scores: Scores, result: Evaluation) -> None:
