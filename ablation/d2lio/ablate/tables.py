@@ -123,7 +123,7 @@ def _block(results: Results, group: str, variants: list[Variant]) -> Table:
     names = {sequence for sequence, _ in runs}
     shown = [v for v in variants if v.id in present]
     sequences = [Header(s.name, s.name, s.dataset) for s in suite.sequences if s.name in names]
-    columns = [Header(v.id, v.label, "" if group else _host(v)) for v in shown]
+    columns = [Header(v.id, v.label, _host(v)) for v in shown]
     baseline = _baseline(suite, shown, in_groups=bool(group))
     cells = _cells(runs, sequences, columns, baseline)
     _add_paper(cells, suite, {v.id: v for v in shown})

@@ -203,6 +203,8 @@
   }
 
   function refresh() {
+    const there = new Set(meta.runs.filter((r) => r.sequence === chosen.sequence).map((r) => r.variant));
+    chips.forEach((button, i) => { button.hidden = !there.has(i); });
     Charts.redraw();
     fillLists();
   }
@@ -226,7 +228,7 @@
     refresh();
   });
 
-  meta.variants.forEach(function (v, i) {
+  const chips = meta.variants.map(function (v, i) {
     const button = element("button"), mark = element("i");
     button.setAttribute("aria-pressed", shown.has(i));
     mark.style.borderTopColor = v.colour;
@@ -238,6 +240,7 @@
       Charts.redraw();
     });
     byId("chips").append(button);
+    return button;
   });
 
   for (const box of document.querySelectorAll(".plot[data-figure]")) {

@@ -13,6 +13,7 @@ from pathlib import Path
 
 from d2lio import __version__
 from d2lio.ablate.results import RESULTS_FILE, SUITE_FILE, TIMINGS_FILE, Results
+from d2lio.ablate.suite import Suite, shipped
 from d2lio.ablate.tables import POOLED_ID, Cell, Header, Table, build, metres
 from d2lio.errors import DataError
 from d2lio.record import RunRecord
@@ -211,7 +212,7 @@ def _made(results: Results, drawn: list[Path]) -> str:
         f"{t.cpu or 'unknown processor'}, {t.cores or '?'} cores" for t in results.timings.values()
     )
     facts = [
-        ("Command", f"d2lio ablate {results.suite.name}"),
+        ("Command", _command(results)),
         ("d2lio", versions or __version__),
         ("Results of", written),
         ("Machine", "; ".join(machines) or "unknown"),
@@ -228,6 +229,14 @@ def _made(results: Results, drawn: list[Path]) -> str:
         f"<p>Data: {links or 'none'}.</p><p>Figures: {figures or 'none'}.</p>"
         f"<p>The suite as it was run:</p><pre>{escape(results.suite.to_yaml())}</pre>"
     )
+
+
+def _command(results: Results) -> str:
+    """What makes the same ablation again; the suite that was run lies beside the page."""
+    known = shipped().get(results.suite.name)
+    if known is not None and Suite.load(known) == results.suite:
+        return f"d2lio ablate {results.suite.name}"
+    return f"d2lio ablate {SUITE_FILE}"
 
 
 def _date(file: Path) -> str:

@@ -61,11 +61,13 @@ def to_latex(table: Table) -> str:
     Bold as in the caption's rule, the lowest median of each sequence underlined.
     """
     width = 1 + len(table.columns)
+    title, rules = _tex(table.title), " ".join(map(_tex, table.rules))
     head = " & ".join([_tex(table.corner), *(_tex(column.title) for column in table.columns)])
     lines = [
         r"\begin{table}",
         r"\centering",
-        rf"\caption{{{_tex(table.title)}. {' '.join(map(_tex, table.rules))}}}",
+        r"\footnotesize",
+        rf"\caption[{title}]{{{title}. {rules}}}",
         rf"\begin{{tabular}}{{l{'r' * len(table.columns)}}}",
         r"\toprule",
         rf"{head} \\",

@@ -46,20 +46,21 @@ def meta(results: Results, tables: Sequence[Table]) -> dict[str, Any]:
     stages = _stage_names(results)
     files, runs = _runs(results, places, numbers)
     baselines = dict.fromkeys(table.baseline for table in tables if table.baseline)
+    shown = _shown_first(results, list(numbers))
     return {
         "variants": [
             {
                 "title": _title(v),
                 "colour": palette.style(index).colour,
                 "dash": palette.style(index).dash,
-                "shown": index < SHOWN,
+                "shown": v.id in shown,
             }
             for index, v in enumerate(variants)
         ],
         "sequences": sequences,
         "runs": runs,
         "files": files,
-        "baseline": " or ".join(suite.variant(b).label for b in baselines) or "the baseline",
+        "baseline": " or ".join(title_of(results, b) for b in baselines) or "the baseline",
         "differences": _differences(tables, places, numbers),
         "outcomes": list(OUTCOMES.values()),
         "outcome_colours": palette.OUTCOME_COLOURS,
@@ -68,6 +69,14 @@ def meta(results: Results, tables: Sequence[Table]) -> dict[str, Any]:
         "timing": [_timing(results, v.id, stages) for v in variants],
         "truth": palette.TRUTH,
     }
+
+
+def _shown_first(results: Results, order: Sequence[str]) -> set[str]:
+    """The first SHOWN variants of every sequence."""
+    own: dict[str, set[str]] = {}
+    for row in results.rows:
+        own.setdefault(row.sequence, set()).add(row.variant)
+    return {v for there in own.values() for v in [x for x in order if x in there][:SHOWN]}
 
 
 def _title(variant: Any) -> str:

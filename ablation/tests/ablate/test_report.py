@@ -11,7 +11,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 from d2lio.ablate.results import Results, load
-from d2lio.ablate.suite import Simulate
+from d2lio.ablate.suite import Simulate, load_suite
+from d2lio.ablate.tables import build
 from d2lio.datasets import open_source
 from d2lio.metrics.tum import read_tum
 from d2lio.report import ablation, cloud, embed, palette, payload
@@ -101,6 +102,31 @@ def test_one_colour_per_variant(page: str) -> None:
     assert looks == [(palette.style(i).colour, "solid") for i in range(len(VARIANTS))]
     many = {(palette.style(i).colour, palette.style(i).dash) for i in range(24)}
     assert len(many) == 24
+
+
+def test_some_variants_of_every_sequence_are_shown_at_first(tmp_path: Path) -> None:
+    groups = ("A", "B")
+    variants = [
+        {"id": f"{g}{k}", "title": f"w = {k}", "group": g, "host": "fastlio"}
+        for g in groups
+        for k in range(8)
+    ]
+    sequences = [{"name": g, "groups": [g], "simulate": {"scene": "room"}} for g in groups]
+    rows = [row(g, 0, f"{g}{k}", 0.1) for g in groups for k in range(8)]
+    made = fake_results(rows, tmp_path, variants=variants, sequences=sequences, baseline="A0",
+                        layout={"blocks": "group"}, paper=None)  # fmt: skip
+    meta = payload.meta(made, build(made))
+    shown = [v["title"] for v in meta["variants"] if v["shown"]]
+    assert shown == [f"{g}: w = {k}" for g in groups for k in range(payload.SHOWN)]
+    assert meta["baseline"] == "A: w = 0 or B: w = 0"
+
+
+def test_the_command_is_that_of_the_shipped_suite_where_it_is(tmp_path: Path) -> None:
+    made = fake_results([row("Tunnel-2", 0, "fastlio", 0.1)], tmp_path)
+    assert "d2lio ablate suite.yaml" in ablation.write(made, tmp_path).read_text(encoding="utf-8")
+    made.suite = load_suite("smoke")
+    made.rows = [row("Room", 0, "fastlio", 0.1)]
+    assert "d2lio ablate smoke<" in ablation.write(made, tmp_path).read_text(encoding="utf-8")
 
 
 def test_timing_and_differences(page: str, results: Results) -> None:
