@@ -51,7 +51,8 @@ def ring_step_for(rings: int) -> int:
     return max(1, rings // RINGS_USED)
 
 
-def _columns(lidar: LidarSource) -> int:
+def columns_of(lidar: LidarSource) -> int:
+    """Columns of a sweep: as stated, else those of the model."""
     return lidar.columns or COLUMNS.get(lidar.model.lower(), DEFAULT_COLUMNS)
 
 
@@ -59,7 +60,7 @@ def range_image(lidar: LidarSource) -> dict[str, str]:
     """Rows and columns of LIO-SAM's range image; without `rings` the host keeps its 16 rows."""
     model = lidar.model.lower()
     params = {
-        "Horizon_SCAN": str(_columns(lidar)),
+        "Horizon_SCAN": str(columns_of(lidar)),
         "columnByOrder": _text(model in LIVOX),
     }
     if lidar.rings:
@@ -79,7 +80,7 @@ def source_params(
         extra: parameters that are going to be set as well; they only decide the front end here.
     """
     if host in PEERS:  # the `host` section is for ours
-        return peer_settings.source_params(config, _columns(config.lidar))
+        return peer_settings.source_params(config, columns_of(config.lidar))
     own = {key: _text(value) for key, value in (config.host | config.hosts.get(host, {})).items()}
     if host in NEED_GTSAM:
         front_end = (own | dict(extra or {})).get("front_end", FRONT_ENDS[host])

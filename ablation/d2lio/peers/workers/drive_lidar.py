@@ -48,7 +48,9 @@ class KissIcp(_Icp):
 
 
 class GenzIcp(_Icp):
-    """genz-icp."""
+    """genz-icp. Its threads cannot be set, and with several it gives another result every time."""
+
+    SCANS_TO_WARM_UP = 3  # the first have no map to register to
 
     def __init__(self, setup: Setup) -> None:
         super().__init__(setup)
@@ -59,6 +61,15 @@ class GenzIcp(_Icp):
         self._data(config)
         config.mapping.voxel_size = setup.params["voxel_size"]
         self.odometry = GenZICP(config)
+        self._scans = 0
+
+    def scan(self, scan: Scan) -> list[Pose]:
+        """See `Driver`."""
+        self._scans += 1
+        if self._scans > self.SCANS_TO_WARM_UP:
+            return super().scan(scan)
+        with self.few_cpus():
+            return super().scan(scan)
 
 
 class MadIcp(Driver):

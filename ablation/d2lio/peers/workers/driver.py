@@ -4,6 +4,7 @@
 
 from __future__ import annotations
 
+import os
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -154,6 +155,23 @@ class Driver:
             yield
         finally:
             self.busy_s += time.perf_counter() - start
+
+    @contextmanager
+    def few_cpus(self) -> Iterator[None]:
+        """Inside, only as many processors as threads are allowed.
+
+        TBB asks once, when it is first used, how many there are, and keeps to it: the way to limit
+        a peer that has no setting for it. Afterwards the scheduler is free to move us again.
+        """
+        if not hasattr(os, "sched_setaffinity"):
+            yield
+            return
+        allowed = os.sched_getaffinity(0)
+        os.sched_setaffinity(0, sorted(allowed)[: self.setup.threads])
+        try:
+            yield
+        finally:
+            os.sched_setaffinity(0, allowed)
 
     def of_lidar(self, T_map_lidar: np.ndarray) -> np.ndarray:
         """T_map_imu of a LiDAR pose; the map is the IMU's frame at the first scan."""
