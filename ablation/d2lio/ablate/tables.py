@@ -264,7 +264,7 @@ def _rules(table: Table, runs: Mapping[tuple[str, str], list[ResultRow]]) -> lis
     times = " to ".join(str(n) for n in dict.fromkeys((counts[0], counts[-1]))) if counts else "0"
     cells = table.cells.values()
     rules = [
-        f"ATE RMSE in metres after SE(3) alignment: the median of {times} runs, a failed run "
+        f"ATE RMSE in metres after SE(3) alignment: the median of n = {times} runs, a failed run "
         f"counting as worse than every other; (k): k of them failed.",
         f"{FAILED}: no median is left. A run fails by a crash, its limit of time or memory, "
         f"divergence, a coverage below {100 * MIN_COVERAGE:g} % or an ATE beyond "

@@ -5,6 +5,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from contextlib import suppress
 from datetime import UTC, datetime
 from html import escape
@@ -12,7 +13,7 @@ from itertools import groupby
 from pathlib import Path
 
 from d2lio import __version__
-from d2lio.ablate.results import RESULTS_FILE, SUITE_FILE, TIMINGS_FILE, Results
+from d2lio.ablate.results import RESULTS_FILE, SUITE_FILE, TIMINGS_FILE, Key, Results
 from d2lio.ablate.suite import Suite, shipped
 from d2lio.ablate.tables import POOLED_ID, Cell, Header, Table, build, metres
 from d2lio.errors import DataError
@@ -21,7 +22,7 @@ from d2lio.report import payload
 from d2lio.report.embed import asset, fill, script_json, write_page
 from d2lio.report.exports import FORMATS, TABLES_DIR, file_stems, write_tables
 from d2lio.report.printed import FIGURES_DIR, write_figures
-from d2lio.report.series import read_series
+from d2lio.report.series import RunSeries, read_series
 
 REPORT_FILE = "report.html"
 
@@ -36,15 +37,15 @@ def write(results: Results, out: Path) -> Path:
     write_tables(results.suite.name, tables, out)
     series = {row.key: read_series(place) for row, place in payload.runs_with_files(results)}
     drawn = write_figures(results, tables, series, out)
-    points = payload.points_per_curve(len(series))
-    meta = payload.meta(results, tables)
-    data = "\n".join(
-        f'<script type="application/json" id="sequence-{number}">'
-        f"{script_json(payload.sequence_data(results, number, series, points))}</script>"
-        for number, _ in enumerate(meta["sequences"])
-    )
+    page = out / REPORT_FILE
+    values = _texts(results, tables, drawn) | _data(results, tables, series)
+    write_page(page, fill(asset("ablation.html"), values))
+    return page
+
+
+def _texts(results: Results, tables: list[Table], drawn: list[Path]) -> dict[str, str]:
     failures = sum(row.status != "ok" for row in results.rows)
-    values = {
+    return {
         "TITLE": escape(results.suite.title or results.suite.name),
         "SUMMARY": _summary(results, failures),
         "NOTES": "".join(f'<p class="fail">{escape(note)}</p>' for note in results.notes),
@@ -54,14 +55,24 @@ def write(results: Results, out: Path) -> Path:
         "MAP": escape(_about_map(results)),
         "FAILED": f"Failures ({failures})",
         "MADE": _made(results, drawn),
+    }
+
+
+def _data(results: Results, tables: list[Table], series: Mapping[Key, RunSeries]) -> dict[str, str]:
+    """What the page's scripts draw, and the scripts."""
+    meta = payload.meta(results, tables)
+    points = payload.points_per_curve(len(series))
+    curves = (
+        f'<script type="application/json" id="sequence-{number}">'
+        f"{script_json(payload.sequence_data(results, number, series, points))}</script>"
+        for number, _ in enumerate(meta["sequences"])
+    )
+    return {
         "META": script_json(meta),
-        "DATA": data,
+        "DATA": "\n".join(curves),
         "TABLE_CODE": asset("table.js"),
         "PAGE_CODE": asset("ablation.js"),
     }
-    page = out / REPORT_FILE
-    write_page(page, fill(asset("ablation.html"), values))
-    return page
 
 
 def _summary(results: Results, failures: int) -> str:

@@ -11,6 +11,17 @@ import numpy as np
 
 from d2lio.errors import DataError
 
+# What becomes of a correspondence that is offered: column, and name for people.
+OUTCOMES = {
+    "accepted": "accepted",
+    "rejected_few_neighbours": "few neighbours",
+    "rejected_far_neighbours": "far neighbours",
+    "rejected_threshold": "threshold",
+    "rejected_singular_plane": "singular plane",
+    "rejected_plane_fit": "plane fit",
+    "rejected_residual": "residual",
+}
+
 
 def read_diagnostics(file: Path) -> dict[str, np.ndarray]:
     """Numeric columns as float64 [N] (empty cells NaN), the others as text [N].
@@ -43,3 +54,11 @@ def seconds_from_start(columns: dict[str, np.ndarray]) -> np.ndarray:
     """Time of each row since the first, s [N]."""
     stamps = columns.get("stamp_ns", np.empty(0))
     return (stamps - stamps[0]) * 1e-9 if len(stamps) else stamps
+
+
+def processed(columns: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
+    """Without the scans that a host skips on purpose, as LIO-SAM does with every other one."""
+    if "status" not in columns:
+        return columns
+    kept = columns["status"] != "skipped"
+    return {name: values[kept] for name, values in columns.items()}

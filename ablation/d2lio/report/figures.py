@@ -10,7 +10,8 @@ import numpy as np
 
 from d2lio.demo import DemoResult, Row, Scene, Variant
 from d2lio.hosts import TITLES
-from d2lio.report.diagnostics import read_diagnostics, seconds_from_start
+from d2lio.report import palette
+from d2lio.report.diagnostics import OUTCOMES, processed, read_diagnostics, seconds_from_start
 
 MAX_POINTS = 400  # per curve
 COLOURS = {
@@ -25,7 +26,6 @@ COLOURS = {
     "d2lio": {"off": "#8c6d31", "point_adaptive": "#00a6b8"},
 }
 OTHER_COLOUR = "#b0508f"
-TRUTH_COLOUR = "#b8b8b8"
 SHOWN = (  # at first: every host as it is, and what this project adds to it
     Variant("off", "none"),
     Variant("point_adaptive", "paper"),
@@ -33,16 +33,6 @@ SHOWN = (  # at first: every host as it is, and what this project adds to it
     Variant("point_adaptive", "paper", "d2lio"),
 )
 STAGES = ("preprocess", "deskew", "downsample", "search", "update", "map")
-OUTCOME_COLOURS = ("#2a9d4a", "#264653", "#5b8ea6", "#d1495b", "#9b5de5", "#e58606", "#e9c46a")
-STAGE_COLOURS = ("#264653", "#2f7ebc", "#7fb7d6", "#e58606", "#d1495b", "#2a9d4a")
-REASONS = {
-    "rejected_few_neighbours": "few neighbours",
-    "rejected_far_neighbours": "far neighbours",
-    "rejected_threshold": "threshold",
-    "rejected_singular_plane": "singular plane",
-    "rejected_plane_fit": "plane fit",
-    "rejected_residual": "residual",
-}
 
 Figure = dict[str, Any]
 Columns = dict[str, np.ndarray]
@@ -86,7 +76,7 @@ def _pale(colour: str) -> str:
 
 
 def _curve(name: str, x: np.ndarray, y: np.ndarray, row: Row | None, **extra: Any) -> Figure:
-    line = {"width": 1.6, "color": TRUTH_COLOUR}
+    line = {"width": 1.6, "color": palette.TRUTH}
     if row is not None:
         line |= line_style(row.variant)
         extra["meta"] = row.variant.label
@@ -160,18 +150,10 @@ def diagnostics_of(result: DemoResult, scene: Scene) -> list[tuple[Row, Columns]
     for variant in result.variants:
         row = result.row(scene, variant)
         if row is not None and row.record is not None:
-            columns = _processed(read_diagnostics(row.directory / "diagnostics.csv"))
+            columns = processed(read_diagnostics(row.directory / "diagnostics.csv"))
             if len(columns.get("stamp_ns", ())):
                 found.append((row, columns))
     return found
-
-
-def _processed(columns: Columns) -> Columns:
-    """Without the scans that a host skips on purpose, as LIO-SAM does with every other one."""
-    if "status" not in columns:
-        return columns
-    kept = columns["status"] != "skipped"
-    return {name: values[kept] for name, values in columns.items()}
 
 
 def lambda_min(runs: list[tuple[Row, Columns]]) -> list[Figure]:
@@ -213,7 +195,7 @@ def rejections(runs: list[tuple[Row, Columns]]) -> Figure:
     """Share of offered correspondences accepted and rejected, by reason."""
     names = _labels(runs)
     data = []
-    for key, label in {"accepted": "accepted", **REASONS}.items():
+    for key, label in OUTCOMES.items():
         shares = [
             100.0 * float(np.nansum(c[key])) / max(float(np.nansum(c["offered"])), 1.0)
             for _, c in runs
@@ -221,7 +203,7 @@ def rejections(runs: list[tuple[Row, Columns]]) -> Figure:
         ]
         if len(shares) == len(names):
             data.append({"type": "bar", "orientation": "h", "name": label, "x": shares, "y": names})
-    return _bars("Correspondences by outcome", "share [%]", data, OUTCOME_COLOURS)
+    return _bars("Correspondences by outcome", "share [%]", data, palette.OUTCOME_COLOURS)
 
 
 def timing(runs: list[tuple[Row, Columns]]) -> Figure:
@@ -238,7 +220,7 @@ def timing(runs: list[tuple[Row, Columns]]) -> Figure:
             data.append(
                 {"type": "bar", "orientation": "h", "name": stage, "x": medians, "y": names}
             )
-    return _bars("Time per scan by stage", "median [ms]", data, STAGE_COLOURS)
+    return _bars("Time per scan by stage", "median [ms]", data, palette.STAGE_COLOURS)
 
 
 def _labels(runs: list[tuple[Row, Columns]]) -> list[str]:

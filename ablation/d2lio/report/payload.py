@@ -12,10 +12,12 @@ from typing import Any
 import numpy as np
 
 from d2lio.ablate.results import Key, ResultRow, Results
+from d2lio.ablate.suite import Variant
 from d2lio.ablate.tables import POOLED_ID, Table
 from d2lio.report import cloud, palette
+from d2lio.report.diagnostics import OUTCOMES
 from d2lio.report.embed import pack, stride
-from d2lio.report.series import OUTCOMES, RunSeries
+from d2lio.report.series import RunSeries
 
 MAX_POINTS = 400  # per curve
 MIN_POINTS = 60
@@ -48,15 +50,7 @@ def meta(results: Results, tables: Sequence[Table]) -> dict[str, Any]:
     baselines = dict.fromkeys(table.baseline for table in tables if table.baseline)
     shown = _shown_first(results, list(numbers))
     return {
-        "variants": [
-            {
-                "title": _title(v),
-                "colour": palette.style(index).colour,
-                "dash": palette.style(index).dash,
-                "shown": v.id in shown,
-            }
-            for index, v in enumerate(variants)
-        ],
+        "variants": [_look(v, index, v.id in shown) for index, v in enumerate(variants)],
         "sequences": sequences,
         "runs": runs,
         "files": files,
@@ -71,6 +65,13 @@ def meta(results: Results, tables: Sequence[Table]) -> dict[str, Any]:
     }
 
 
+def _look(variant: Variant, index: int, shown: bool) -> dict[str, Any]:
+    style = palette.style(index)
+    return {
+        "title": _title(variant), "colour": style.colour, "dash": style.dash, "shown": shown
+    }  # fmt: skip
+
+
 def _shown_first(results: Results, order: Sequence[str]) -> set[str]:
     """The first SHOWN variants of every sequence."""
     own: dict[str, set[str]] = {}
@@ -79,7 +80,7 @@ def _shown_first(results: Results, order: Sequence[str]) -> set[str]:
     return {v for there in own.values() for v in [x for x in order if x in there][:SHOWN]}
 
 
-def _title(variant: Any) -> str:
+def _title(variant: Variant) -> str:
     """The label, with the group where other groups may have the same label."""
     label = variant.label
     return f"{variant.group}: {label}" if variant.group and variant.group not in label else label

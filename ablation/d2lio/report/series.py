@@ -4,7 +4,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from contextlib import suppress
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -16,19 +15,10 @@ from d2lio.errors import DataError
 from d2lio.metrics.matching import match
 from d2lio.metrics.tum import Trajectory, finite, read_tum
 from d2lio.record import DIAGNOSTICS_FILE, TRAJECTORY_FILE
-from d2lio.report.diagnostics import read_diagnostics
+from d2lio.report.diagnostics import OUTCOMES, processed, read_diagnostics
 
 TRUTH_FILE = "truth.tum"
 MIN_PAIRS = 3  # fewer positions give no alignment
-OUTCOMES = {
-    "accepted": "accepted",
-    "rejected_few_neighbours": "few neighbours",
-    "rejected_far_neighbours": "far neighbours",
-    "rejected_threshold": "threshold",
-    "rejected_singular_plane": "singular plane",
-    "rejected_plane_fit": "plane fit",
-    "rejected_residual": "residual",
-}
 
 Array = np.ndarray
 
@@ -91,17 +81,16 @@ def align(points: Array, target: Array) -> Array:
     return (points - center) @ (U @ handed @ Vt).T + goal
 
 
-def _add_diagnostics(series: RunSeries, columns: Mapping[str, Array], start_ns: int) -> None:
+def _add_diagnostics(series: RunSeries, columns: dict[str, Array], start_ns: int) -> None:
+    columns = processed(columns)
     stamps = columns.get("stamp_ns", np.empty(0))
     if not len(stamps):
         return
-    # LIO-SAM skips every other scan on purpose.
-    kept = columns["status"] != "skipped" if "status" in columns else np.full(len(stamps), True)
-    series.t_scan = (stamps[kept] - start_ns) / NS_PER_S
+    series.t_scan = (stamps - start_ns) / NS_PER_S
     for block in ("t", "r"):
         values = columns.get(f"lambda_{block}_1")
         if values is not None and values.dtype.kind == "f":
-            setattr(series, f"lambda_{block}", values[kept])
+            setattr(series, f"lambda_{block}", values)
     offered = float(np.nansum(columns["offered"])) if "offered" in columns else 0.0
     if offered > 0.0:
         series.shares = {
