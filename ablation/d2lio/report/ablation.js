@@ -7,7 +7,7 @@
   const meta = JSON.parse(byId("meta").textContent);
   const shown = new Set(meta.variants.map((v, i) => i).filter((i) => meta.variants[i].shown));
   const parsed = new Map(); // sequence → its curves
-  const chosen = { sequence: 0, repeat: 0 };
+  const chosen = { sequence: 0, repeat: 0, align: "whole" };
 
   function curves() {
     if (!parsed.has(chosen.sequence)) {
@@ -58,10 +58,21 @@
     xaxis: { title: { text: x, standoff: 6 } }, yaxis: { title: { text: y } },
   }, more);
 
+  // The path of a run, aligned as chosen: run.m (3x4, by rows) leads from the one to the other.
+  function path(run) {
+    const [x, y, z] = [decode(run.x), decode(run.y), decode(run.z)];
+    if (chosen.align === "whole" || !run.m) { return { x: x, y: y, z: z }; }
+    const row = (k) => x.map((value, i) => run.m[k] * value + run.m[k + 1] * y[i] + run.m[k + 2] * z[i] + run.m[k + 3]);
+    return { x: row(0), y: row(4), z: row(8) };
+  }
+
   function view(title, axis) {
     const truth = current().truth || {}, x = decode(truth.x), y = decode(truth[axis]);
     const data = [{ type: "scatter", mode: "lines", name: "truth", x: x, y: y, line: { width: 5, color: meta.truth } }];
-    for (const [i, run] of runs()) { data.push(line(i, decode(run.x), decode(run[axis]))); }
+    for (const [i, run] of runs()) {
+      const moved = path(run);
+      data.push(line(i, moved.x, moved[axis]));
+    }
     const layout = plain(title, "x [m]", axis + " [m]");
     if (x.length) {
       layout.xaxis.range = roomy(x);
@@ -89,7 +100,7 @@
   const figures = {
     top: () => view("Top view", "y"),
     side: () => view("Side view", "z"),
-    error: () => overTime("Translation error", "error [m]", "t", "e"),
+    error: () => overTime("Translation error, aligned as a whole", "error [m]", "t", "e"),
     lambda_t: () => overTime("λ_min, translation block", "λ_min [points]", "s", "lt"),
     lambda_r: () => overTime("λ_min, rotation block", "λ_min [points·m²]", "s", "lr"),
     outcomes: function () {
@@ -135,17 +146,17 @@
     },
     space: function () {
       const map = curves().map || {}, truth = current().truth || {}, data = [];
-      const path = (source, style, name) => ({ type: "scatter3d", mode: "lines", name: name, x: decode(source.x),
-        y: decode(source.y), z: decode(source.z), line: style });
+      const trace3 = (points, style, name) => Object.assign({ type: "scatter3d", mode: "lines", name: name, line: style }, points);
       if (map.x && chosen.repeat === meta.sequences[chosen.sequence].repeats[0]) {
-        data.push({ type: "scatter3d", mode: "markers", name: "map", hoverinfo: "skip", x: decode(map.x), y: decode(map.y),
-          z: decode(map.z), marker: { size: 1.3, color: decode(map.z), colorscale: "Viridis", opacity: 0.6 } });
+        const z = decode(map.z), sorted = z.slice().sort((a, b) => a - b), at = (share) => sorted[Math.floor(share * (sorted.length - 1))];
+        data.push({ type: "scatter3d", mode: "markers", name: "map", hoverinfo: "skip", x: decode(map.x), y: decode(map.y), z: z,
+          marker: { size: 1.3, color: z, cmin: at(0.02), cmax: at(0.98), colorscale: "Viridis", opacity: 0.6 } });
       }
-      data.push(path(truth, { color: meta.truth, width: 7 }, "truth"));
+      data.push(trace3(path(truth), { color: meta.truth, width: 7 }, "truth"));
       const all = ["x", "y", "z"].map((k) => decode(truth[k]).concat(decode(map[k])));
       const ranges = all.map((values) => (values.length ? roomy(values) : [-1, 1]));
       for (const [i, run] of runs()) {
-        const trace = path(run, { color: meta.variants[i].colour, width: 4 }, meta.variants[i].title);
+        const trace = trace3(path(run), { color: meta.variants[i].colour, width: 4 }, meta.variants[i].title);
         // A lost path would shrink everything else: it ends at the frame.
         ["x", "y", "z"].forEach(function (axis, k) {
           trace[axis] = trace[axis].map((value) => (value < ranges[k][0] || value > ranges[k][1] ? null : value));
@@ -155,7 +166,7 @@
       const sizes = ranges.map(([low, high]) => high - low), largest = Math.max(...sizes);
       const ratio = { x: 1.7 * sizes[0] / largest, y: 1.7 * sizes[1] / largest, z: 1.7 * sizes[2] / largest };
       const eye = ratio.x > ratio.y ? { x: -0.35, y: -1.25, z: 0.75 } : { x: -1.25, y: -0.35, z: 0.75 }; // across the longer side
-      const axis = (name, k) => ({ title: { text: name + " [m]" }, range: ranges[k], backgroundcolor: "rgba(0,0,0,0)" });
+      const axis = (name, k) => ({ title: { text: name + " [m]" }, range: ranges[k], nticks: name === "z" ? 4 : 8, backgroundcolor: "rgba(0,0,0,0)" });
       return { data: data, layout: { title: { text: "" }, showlegend: false, margin: { l: 0, r: 0, t: 0, b: 0 }, dragmode: "orbit",
         uirevision: "space", scene: { aspectmode: "manual", aspectratio: ratio, camera: { eye: eye }, xaxis: axis("x", 0), yaxis: axis("y", 1), zaxis: axis("z", 2) } } };
     },
@@ -222,6 +233,10 @@
     chosen.sequence = Number(event.target.value);
     setRepeats();
     refresh();
+  });
+  byId("align").addEventListener("change", function (event) {
+    chosen.align = event.target.value;
+    Charts.redraw();
   });
   byId("repeat").addEventListener("change", function (event) {
     chosen.repeat = Number(event.target.value);

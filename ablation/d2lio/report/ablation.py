@@ -83,7 +83,7 @@ def _summary(results: Results, failures: int) -> str:
     kind = "simulated sequences" if simulated == len(rows) else "sequences"
     text = (
         f"{escape(results.suite.description)} {len(rows)} runs: {variants} variants on {sequences} "
-        f"{kind}, {len({row.repeat for row in rows})} repeats each; {failures} failed."
+        f"{kind}, each run {_times(len({row.repeat for row in rows}))}; {failures} failed."
     )
     if simulated and results.suite.paper is not None:
         text += (
@@ -91,6 +91,10 @@ def _summary(results: Results, failures: int) -> str:
             " kind of place and sensor, so the paper's numbers stand beside ours for orientation."
         )
     return text.strip()
+
+
+def _times(count: int) -> str:
+    return {0: "never", 1: "once", 2: "twice"}.get(count, f"{count} times")
 
 
 def _with_prior(results: Results) -> str:

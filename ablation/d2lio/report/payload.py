@@ -135,7 +135,7 @@ def _has_content(file: Path) -> bool:
 def _number(value: float | None) -> float | None:
     if value is None or not math.isfinite(value):
         return None
-    return float(f"{value:.6g}")
+    return float(f"{value:.9g}")
 
 
 def _differences(
@@ -207,6 +207,9 @@ def _curves(run: RunSeries, points: int) -> dict[str, Any]:
     if len(run.t):
         curves = _points(run.path, points)
         curves |= {"t": pack(run.t[::path]), "e": pack(run.error[::path], log=True)}
+    if run.restart is not None:
+        R, t = run.restart
+        curves["m"] = [_number(float(v)) for v in np.column_stack([R, t]).ravel()]
     if len(run.lambda_t) and len(run.lambda_r):
         curves |= {
             "s": pack(run.t_scan[::scan]),

@@ -7,7 +7,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 
@@ -81,6 +81,7 @@ def _new(rows: int, columns: int, size: tuple[float, float]) -> tuple[Figure, li
     from matplotlib.figure import Figure
 
     figure = Figure(figsize=size, layout="constrained")
+    figure.get_layout_engine().set(h_pad=0.1)  # titles above panels of equal scales are cut else
     FigureCanvasAgg(figure)
     return figure, list(np.ravel(figure.subplots(rows, columns, squeeze=False)))
 
@@ -171,11 +172,22 @@ def _panel(
         ax.set_xlim(*ranges[0])
         ax.set_ylim(*ranges[1])
     else:
-        ax.set_yscale("log")
+        _logarithmic(ax, "y")
     for variant, run in runs.items():
         look = styles[variant]
         x, y = _line(run, kind)
         ax.plot(x, y, color=look.colour, linestyle=look.linestyle, linewidth=1.1)
+
+
+def _logarithmic(ax: Axes, name: Literal["x", "y"]) -> None:
+    """A logarithmic axis with plain numbers at 1, 2 and 5."""
+    from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
+
+    ax.set_xscale("log") if name == "x" else ax.set_yscale("log")
+    axis = ax.xaxis if name == "x" else ax.yaxis
+    axis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
+    axis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
+    axis.set_minor_formatter(NullFormatter())
 
 
 def _roomy(values: np.ndarray) -> tuple[float, float]:
@@ -221,7 +233,7 @@ def _ate(results: Results, table: Table) -> Figure | None:
     for ax, sequence in zip(axes, sequences, strict=True):
         ax.set_title(sequence.title)
         ax.set_ylabel("ATE [m]")
-        ax.set_yscale("log")
+        _logarithmic(ax, "y")
         ax.grid(axis="x", visible=False)
         ax.set_xticks([])
         ax.set_xlim(-0.6, len(variants) - 0.4)
@@ -278,6 +290,6 @@ def _timing(results: Results) -> Figure | None:
     labels = [payload.title_of(results, v) for v in values]
     ax.set_yticks(range(1, len(values) + 1), labels)
     ax.invert_yaxis()
-    ax.set_xscale("log")
+    _logarithmic(ax, "x")
     ax.set_xlabel("median time per scan of a run [ms]")
     return figure

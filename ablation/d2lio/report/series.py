@@ -9,6 +9,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 import numpy as np
+from scipy.spatial.transform import Rotation
 
 from d2lio.datasets.events import NS_PER_S
 from d2lio.errors import DataError
@@ -31,6 +32,8 @@ class RunSeries:
         truth: m [M, 3].
         t, path, error: of the matched poses: s [N] from the truth's begin, m [N, 3] aligned to the
             truth (SE(3), least squares), m [N].
+        restart: R [3, 3], t [3] that move `path` so that only the first poses agree; alignment as a
+            whole hides how far a lost run stayed behind. None where the truth has no attitudes.
         t_scan, lambda_t, lambda_r: per processed scan: s [K], smallest eigenvalue of each block.
         shares: of the correspondences offered, by outcome, [0, 1].
     """
@@ -39,6 +42,7 @@ class RunSeries:
     t: Array = field(default_factory=lambda: np.empty(0))
     path: Array = field(default_factory=lambda: np.empty((0, 3)))
     error: Array = field(default_factory=lambda: np.empty(0))
+    restart: tuple[Array, Array] | None = None
     t_scan: Array = field(default_factory=lambda: np.empty(0))
     lambda_t: Array = field(default_factory=lambda: np.empty(0))
     lambda_r: Array = field(default_factory=lambda: np.empty(0))
@@ -69,16 +73,28 @@ def _add_path(series: RunSeries, truth: Trajectory, estimate: Trajectory) -> Non
     if len(pair.truth) < MIN_PAIRS:
         return
     series.t = (pair.truth.stamps - truth.stamps[0]) / NS_PER_S
-    series.path = align(pair.estimate.positions, pair.truth.positions)
+    R, t = align(pair.estimate.positions, pair.truth.positions)
+    series.path = pair.estimate.positions @ R.T + t
+    if not truth.position_only:
+        R_start, t_start = _align_start(pair.truth, pair.estimate)
+        series.restart = (R_start @ R.T, t_start - R_start @ R.T @ t)
     series.error = np.linalg.norm(series.path - pair.truth.positions, axis=1)
 
 
-def align(points: Array, target: Array) -> Array:
-    """Points [N, 3] moved rigidly onto their partners [N, 3] (Umeyama 1991, without scale)."""
+def align(points: Array, target: Array) -> tuple[Array, Array]:
+    """R [3, 3], t [3] that move points [N, 3] onto their partners (Umeyama 1991, without scale)."""
     center, goal = points.mean(axis=0), target.mean(axis=0)
     U, _, Vt = np.linalg.svd((target - goal).T @ (points - center))
     handed = np.diag([1.0, 1.0, np.sign(np.linalg.det(U @ Vt))])
-    return (points - center) @ (U @ handed @ Vt).T + goal
+    R = U @ handed @ Vt
+    return R, goal - R @ center
+
+
+def _align_start(truth: Trajectory, estimate: Trajectory) -> tuple[Array, Array]:
+    """R, t that move the estimate's first pose onto the truth's."""
+    ours, theirs = (Rotation.from_quat(x.quaternions[0]) for x in (estimate, truth))
+    turn = theirs * ours.inv()
+    return turn.as_matrix(), truth.positions[0] - turn.apply(estimate.positions[0])
 
 
 def _add_diagnostics(series: RunSeries, columns: dict[str, Array], start_ns: int) -> None:

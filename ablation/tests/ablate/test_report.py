@@ -199,14 +199,37 @@ def test_filling_a_template_leaves_values_alone() -> None:
         embed.fill("@@NOBODY@@", {})
 
 
+def moved_back(points: np.ndarray, target: np.ndarray) -> np.ndarray:
+    R, t = align(points, target)
+    assert np.linalg.det(R) == pytest.approx(1.0)
+    return points @ R.T + t
+
+
 def test_alignment_undoes_a_rigid_motion() -> None:
     rng = np.random.default_rng(2)
     target = rng.normal(size=(30, 3))
     moved = Rotation.random(random_state=3).apply(target) + np.array([5.0, -2.0, 1.0])
-    assert align(moved, target) == pytest.approx(target, abs=RIGID_M)
+    assert moved_back(moved, target) == pytest.approx(target, abs=RIGID_M)
     flat = target * [1.0, 1.0, 0.0]  # a mirrored solution would be as near here
     turned = Rotation.from_euler("x", 180, degrees=True).apply(flat)
-    assert align(turned, flat) == pytest.approx(flat, abs=RIGID_M)
+    assert moved_back(turned, flat) == pytest.approx(flat, abs=RIGID_M)
+
+
+def test_a_run_that_stands_still_starts_with_the_truth(tmp_path: Path) -> None:
+    turned = "0 0 0.7071067811865476 0.7071067811865476"  # the estimate's map is turned by 90 deg
+    times = range(10)
+    truth = "".join(f"{k} {k} 0 1 0 0 0 1\n" for k in times)
+    estimate = "".join(f"{k} 7 {min(k, 3)} 0 {turned}\n" for k in times)
+    (tmp_path / "truth.tum").write_text(truth)
+    (tmp_path / "trajectory.tum").write_text(estimate)
+    series = read_series(tmp_path)
+    assert series.restart is not None
+    R, t = series.restart
+    expected = [[min(k, 3), 0.0, 1.0] for k in times]
+    assert series.path @ R.T + t == pytest.approx(np.array(expected), abs=RIGID_M)
+    assert series.path.mean(axis=0) == pytest.approx([4.5, 0.0, 1.0])  # as a whole: in the middle
+    (tmp_path / "truth.tum").write_text(truth.replace("0 0 0 1\n", "0 0 0 0\n"))
+    assert read_series(tmp_path).restart is None  # no attitudes
 
 
 def test_a_run_that_left_little_gives_few_curves(tmp_path: Path) -> None:

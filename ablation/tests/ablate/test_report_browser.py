@@ -23,6 +23,7 @@ SKIP = "D2LIO_SKIP_BROWSER"
 BROWSERS = ("chromium", "chromium-browser", "google-chrome")
 WAIT_S = 60.0  # a machine under load; every wait ends as soon as what it waits for is there
 PHONE = 360
+FIRST_M = 2e-3  # steps of packed curves
 DESKTOP = 1280
 ARGUMENTS = (
     "--headless=new", "--no-sandbox", "--disable-dev-shm-usage", "--disable-background-networking",
@@ -215,6 +216,20 @@ def test_curves_are_those_of_the_choice(visit: Callable[..., Any]) -> None:
     until(driver, f"({names}).length === 3")  # LIO-SAM crashed there
     driver.find_element("xpath", "//*[@id='chips']/button[contains(., 'D²-LIO')]").click()
     until(driver, f"({names}).join() === 'FAST-LIO2,VoxelMap'")
+
+
+def test_paths_can_be_aligned_at_their_start(visit: Callable[..., Any]) -> None:
+    from selenium.webdriver.support.ui import Select
+
+    driver = visit()
+    driver.execute_script("document.getElementById('trajectories').scrollIntoView()")
+    first = "document.querySelector('[data-figure=top]').data?.map((trace) => trace.y[0])"
+    truth, *before = until(driver, first)
+    assert max(abs(y - truth) for y in before) > FIRST_M
+    Select(driver.find_element("id", "align")).select_by_value("start")
+    until(driver, f"({first})[1] !== {before[0]}")
+    truth, *after = until(driver, first)
+    assert after == pytest.approx([truth] * len(after), abs=FIRST_M)
 
 
 def test_a_phone_scrolls_tables_in_their_box_and_not_the_page(visit: Callable[..., Any]) -> None:
