@@ -19,6 +19,7 @@ TOLERANCE_S = 1e-5
 MIN_POSES = 10
 MIN_EXTENT_M = 0.1  # RMS about the mean; what stands still has no time
 MIN_CONTRAST = 1e-3  # of the error over the grid; along a straight way at one speed there is none
+MIN_CHANGE_M = 1e-6  # nor there, where the error is but rounding
 DENSER = 1.5  # as in `matching`: the denser trajectory is interpolated
 
 
@@ -62,7 +63,7 @@ def _search(dense: Trajectory, sparse: Trajectory, sign: float, limit_s: float) 
 
     grid = np.linspace(-limit_s, limit_s, 2 * round(limit_s / GRID_S) + 1)
     errors = np.array([error(shift) for shift in grid])
-    if np.ptp(errors) <= MIN_CONTRAST * errors.max():
+    if np.ptp(errors) <= max(MIN_CONTRAST * errors.max(), MIN_CHANGE_M):
         return None
     best = int(errors.argmin())
     bounds = (grid[max(best - 1, 0)], grid[min(best + 1, len(grid) - 1)])
