@@ -132,8 +132,6 @@ def _evalio(
     )
 
 
-INDOORS = "the scenes include rooms; LIO-SAM's own indoor value"
-
 _ALL = (
     Peer(
         name="kiss-icp",
@@ -200,8 +198,8 @@ _ALL = (
         driver="small_gicp",
         pose="LiDAR, end of the scan (the odometry loop is ours)",
         settings=(
-            _voxel(0.5, "of the Gaussian voxel map"),
-            Setting("downsampling_resolution", 0.25, 0.05, 5.0, "m", "of the scan"),
+            _voxel(1.0, "of the Gaussian voxel map"),
+            Setting("downsampling_resolution", 0.5, 0.05, 5.0, "m", "of the scan"),
             Setting("max_correspondence_distance", 2.0, 0.1, 20.0, "m", "gate of the matches"),
             Setting("max_iterations", 30, 1, 200, "", "of one registration"),
             Setting("map_scans", 300, 10, 1000000, "", "scans after which an unseen voxel goes"),
@@ -245,7 +243,7 @@ _ALL = (
         package="se3-lio",
         version="0.2.0",
         licence="GPL-2.0-only",
-        url="https://pypi.org/project/se3-lio",
+        url="https://github.com/url-kaist/se3-lio",
         kind="LIO",
         driver="se3_lio",
         pose="IMU, the state's stamp (end of the scan)",
@@ -274,10 +272,9 @@ _ALL = (
     _evalio("liosam", "LIO-SAM (evalio)", "LIO", "BSD-3-Clause", (
         Setting("mappingProcessInterval", 0.0, 0.0, 10.0, "s", "least time between two scans",
                 0.15, "it would repeat every second pose"),
-        Setting("odometrySurfLeafSize", 0.2, 0.05, 5.0, "m", "of the surface features",
-                0.4, INDOORS),
-        Setting("mappingCornerLeafSize", 0.1, 0.05, 5.0, "m", "of the corner map", 0.2, INDOORS),
-        Setting("mappingSurfLeafSize", 0.2, 0.05, 5.0, "m", "of the surface map", 0.4, INDOORS),
+        Setting("odometrySurfLeafSize", 0.4, 0.05, 5.0, "m", "of the surface features"),
+        Setting("mappingCornerLeafSize", 0.2, 0.05, 5.0, "m", "of the corner map"),
+        Setting("mappingSurfLeafSize", 0.4, 0.05, 5.0, "m", "of the surface map"),
     )),
     _evalio("dlio", "DLIO (evalio)", "LIO", "MIT", (
         Setting("imu_calib_time", 1.5, 0.0, 60.0, "s", "standstill its IMU calibration takes",
