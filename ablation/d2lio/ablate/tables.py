@@ -367,7 +367,7 @@ def to_text(results: Results, width: int = 120) -> str:
     from rich.console import Console
 
     console = Console(width=width, color_system=None, force_terminal=False)
-    parts = []
+    parts, said = [], None
     for table in build(results):
         cells = {
             key: replace(cell, text=f"*{cell.text}", bold=False) if cell.bold else cell
@@ -375,6 +375,8 @@ def to_text(results: Results, width: int = 120) -> str:
         }
         with console.capture() as capture:
             console.print(to_rich(replace(table, cells=cells)))
-        rules = (textwrap.fill(rule.replace("Bold:", "*:"), width) for rule in table.rules)
+        new = table.rules if table.rules != said else []
+        said = table.rules
+        rules = (textwrap.fill(rule.replace("Bold:", "*:"), width) for rule in new)
         parts.append("\n".join([capture.get().rstrip("\n"), *rules]) + "\n")
     return "\n".join(parts)

@@ -153,7 +153,11 @@
           marker: { size: 1.3, color: z, cmin: at(0.02), cmax: at(0.98), colorscale: "Viridis", opacity: 0.6 } });
       }
       data.push(trace3(path(truth), { color: meta.truth, width: 7 }, "truth"));
-      const all = ["x", "y", "z"].map((k) => decode(truth[k]).concat(decode(map[k])));
+      const most = (values) => { // without the few points far away
+        const sorted = values.slice().sort((a, b) => a - b), cut = Math.floor(sorted.length / 50);
+        return sorted.slice(cut, sorted.length - cut);
+      };
+      const all = ["x", "y", "z"].map((k) => decode(truth[k]).concat(most(decode(map[k]))));
       const ranges = all.map((values) => (values.length ? roomy(values) : [-1, 1]));
       for (const [i, run] of runs()) {
         const trace = trace3(path(run), { color: meta.variants[i].colour, width: 4 }, meta.variants[i].title);
@@ -164,7 +168,7 @@
         data.push(trace);
       }
       const sizes = ranges.map(([low, high]) => high - low), largest = Math.max(...sizes);
-      const ratio = { x: 1.7 * sizes[0] / largest, y: 1.7 * sizes[1] / largest, z: 1.7 * sizes[2] / largest };
+      const ratio = { x: 1.9 * sizes[0] / largest, y: 1.9 * sizes[1] / largest, z: 1.9 * sizes[2] / largest };
       const eye = ratio.x > ratio.y ? { x: -0.35, y: -1.25, z: 0.75 } : { x: -1.25, y: -0.35, z: 0.75 }; // across the longer side
       const axis = (name, k) => ({ title: { text: name + " [m]" }, range: ranges[k], nticks: name === "z" ? 4 : 8, backgroundcolor: "rgba(0,0,0,0)" });
       return { data: data, layout: { title: { text: "" }, showlegend: false, margin: { l: 0, r: 0, t: 0, b: 0 }, dragmode: "orbit",

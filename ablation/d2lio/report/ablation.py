@@ -136,15 +136,21 @@ def _block(results: Results, tables: list[Table], index: int) -> str:
     stem = file_stems(results.suite.name, tables)[index]
     links = ", ".join(f'<a href="{TABLES_DIR}/{stem}{s}">{s[1:]}</a>' for s in FORMATS)
     heading = f"<h3>{escape(table.title)}</h3>" if len(tables) > 1 else ""
-    rules = "".join(f"<li>{escape(rule)}</li>" for rule in table.rules)
+    said = index > 0 and table.rules == tables[index - 1].rules
     return (
         f'<section class="block">{heading}'
         f'<div class="scroll"><table class="results">{_head(table)}{_body(table)}</table></div>'
         f'<p class="dim">Sort by a column\'s title; point at or tap a cell for what lies behind '
         f"it. As a file: {links}.</p>"
+        f"{'' if said else _signs(table)}</section>"
+    )
+
+
+def _signs(table: Table) -> str:
+    rules = "".join(f"<li>{escape(rule)}</li>" for rule in table.rules)
+    return (
         f"<details open><summary>What the signs mean</summary>"
         f'<ul class="rules">{rules}</ul></details>'
-        f"</section>"
     )
 
 

@@ -13,7 +13,7 @@ import numpy as np
 
 from d2lio.ablate.results import Key, Results
 from d2lio.ablate.statistics import CellStats
-from d2lio.ablate.tables import FAILED, POOLED_ID, Header, Table
+from d2lio.ablate.tables import POOLED_ID, Header, Table
 from d2lio.report import palette, payload
 from d2lio.report.series import RunSeries
 
@@ -26,6 +26,7 @@ SUFFIXES = (".png", ".svg", ".pdf")
 COLUMNS = 4  # of small figures beside each other
 PANEL_INCHES = (3.4, 2.5)
 DPI = 130
+MAX_LINEAR_RATIO = 20.0  # of bars in one panel
 
 _RC = {
     "font.size": 8,
@@ -233,22 +234,31 @@ def _ate(results: Results, table: Table) -> Figure | None:
     for ax, sequence in zip(axes, sequences, strict=True):
         ax.set_title(sequence.title)
         ax.set_ylabel("ATE [m]")
-        _logarithmic(ax, "y")
         ax.grid(axis="x", visible=False)
         ax.set_xticks([])
         ax.set_xlim(-0.6, len(variants) - 0.4)
-        for x, variant in enumerate(variants):
-            keys = (sequence.id, variant.id) if of_sequences else (variant.id, sequence.id)
-            cell = table.cells.get(keys)
-            if cell is not None and cell.stats is not None:
-                _bar(ax, x, cell.stats, styles[variant.id])
+        order = [(sequence.id, v.id) if of_sequences else (v.id, sequence.id) for v in variants]
+        stats = [table.cells[key].stats if key in table.cells else None for key in order]
+        _bars(ax, stats, [styles[v.id] for v in variants])
     _bar_legend(figure, variants, styles)
     return figure
 
 
+def _bars(ax: Axes, stats: Sequence[CellStats | None], looks: Sequence[palette.Style]) -> None:
+    """Bars from zero; logarithmic only where some could not be seen then."""
+    medians = [s.median for s in stats if s is not None and s.median]
+    if medians and max(medians) > MAX_LINEAR_RATIO * min(medians):
+        _logarithmic(ax, "y")
+        ax.set_ylim(bottom=min(medians) / 3.0)
+    for x, (cell, look) in enumerate(zip(stats, looks, strict=True)):
+        if cell is not None:
+            _bar(ax, x, cell, look)
+
+
 def _bar(ax: Axes, x: float, stats: CellStats, look: palette.Style) -> None:
     if stats.median is None:
-        ax.text(x, 0.02, FAILED, transform=ax.get_xaxis_transform(), ha="center", color=look.colour)
+        place = {"transform": ax.get_xaxis_transform(), "ha": "center", "va": "bottom"}
+        ax.text(x, 0.03, "failed", rotation=90, color=look.colour, **place)
         return
     ax.bar(x, stats.median, 0.8, color=look.colour, hatch=look.hatch, edgecolor="white")
     if stats.low is not None and stats.high is not None and stats.n > 1:
