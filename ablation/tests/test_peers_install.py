@@ -102,6 +102,9 @@ def test_what_mad_icp_is_built_with_is_held_back(pip: FakePip) -> None:
     environments.install(MAD)
     assert set(pip.constraints) == {"scikit-build-core<0.10\n"}
     assert {"PIP_CONSTRAINT", "PIP_BUILD_CONSTRAINT"} == set(pip.extra[1])
+    alone, together = pip.commands[1:3]
+    assert alone[-2:] == ["--no-deps", "mad-icp==0.0.10"]
+    assert together[-2:] == ["--quiet", "numpy>=1.26"]
     environments.install(KISS)
     assert pip.extra[-1] == pip.extra[-2] == {}
 

@@ -56,6 +56,7 @@ class Peer:
     Attributes:
         name: of the host; title, short: in tables.
         package, version: what pip installs; requirements: beside it.
+        alone: the package is installed without what it says it depends on (viewers, plotting).
         build_constraints: of the packages it is built with.
         licence: SPDX; url: where it comes from.
         kind: LO (LiDAR only) or LIO (with IMU).
@@ -78,6 +79,7 @@ class Peer:
     settings: tuple[Setting, ...] = ()
     fixed: tuple[tuple[str, str], ...] = ()
     requirements: tuple[str, ...] = (NUMPY,)
+    alone: bool = False
     build_constraints: tuple[str, ...] = ()
     environment: str = ""
     worker: str = "serve.py"
@@ -94,7 +96,7 @@ class Peer:
 
     @property
     def pins(self) -> list[str]:
-        """What pip is told to install."""
+        """What pip is told to install; the package comes first."""
         return [f"{self.package}=={self.version}", *self.requirements]
 
 
@@ -175,7 +177,7 @@ _ALL = (
         kind="LO",
         driver="mad_icp",
         pose="LiDAR, end of the scan",
-        requirements=(NUMPY, "scipy", "click<8.2"),
+        alone=True,  # else 1.4 GB of viewers
         build_constraints=("scikit-build-core<0.10",),
         settings=(
             _deskew(True),

@@ -109,7 +109,11 @@ def _make(peer: Peer, place: Path) -> None:
         # Old pips read the first for what they build with, new ones the second.
         variables = ("PIP_CONSTRAINT", "PIP_BUILD_CONSTRAINT") if peer.build_constraints else ()
         extra = dict.fromkeys(variables, str(constraints))
-        _run([*pip, "install", "--quiet", *peer.pins], peer, extra)
+        package, *rest = peer.pins
+        if peer.alone:
+            _run([*pip, "install", "--quiet", "--no-deps", package], peer, extra)
+        together = rest if peer.alone else peer.pins
+        _run([*pip, "install", "--quiet", *together], peer, extra)
     frozen = _run([*pip, "freeze"], peer, {}).splitlines()
     manifest = {"pins": peer.pins, "packages": sorted(frozen)}
     partial = place / f".{MANIFEST}"
