@@ -75,6 +75,8 @@ def ablate(suite: Suite, out: Path, options: AblateOptions, watcher: Watcher) ->
         done = {} if options.fresh else _done(plan, out)
         if options.fresh:
             _forget(plan, out)
+        if len(done) < len(plan.cells):
+            results.discard(out)  # never tables of another suite beside suite.yaml
         results.write_text(out / results.SUITE_FILE, plan.suite.to_yaml())
         tally = _carry_out(plan, done, out, options, watcher)
         return Ablation(_collect(plan, tally, out), tally.problems)

@@ -148,6 +148,13 @@ def save(out: Path, rows: Iterable[ResultRow], timings: Iterable[TimingRow]) -> 
     _write(out / TIMINGS_FILE, _timing_types(costs), costs)
 
 
+def discard(out: Path) -> None:
+    """Removes both tables."""
+    for name in (RESULTS_FILE, TIMINGS_FILE):
+        for file in (out / name, (out / name).with_suffix(".parquet")):
+            file.unlink(missing_ok=True)
+
+
 def write_text(file: Path, text: str) -> None:
     """Writes a file in one go.
 

@@ -149,6 +149,22 @@ def test_changed_variants_alone_run_again(uninterrupted: Path) -> None:
     run(uninterrupted)  # as it was, for the other tests
 
 
+def test_tables_of_before_do_not_outlive_what_they_were_made_of(tmp_path: Path) -> None:
+    suite = {"repeats": 1, "sequences": [{"name": "Short", "simulate": tiny.ROOM}]}
+    out = tmp_path / "out"
+    run(out, suite=suite)
+
+    def stop(count: int) -> None:
+        raise KeyboardInterrupt
+
+    suite["variants"] = [tiny.FASTLIO, {**tiny.ADAPTIVE, "rejection": "kiss"}]
+    with pytest.raises(KeyboardInterrupt):
+        run(out, tiny.Memory(stop), suite=suite)
+    assert not any((out / name).exists() for name in TABLES if name != "suite.yaml")
+    ablation = run(out, suite=suite)
+    assert [row.rejection for row in ablation.results.rows] == ["off", "kiss"]
+
+
 def test_fresh_runs_everything_again(tmp_path: Path) -> None:
     suite = {"repeats": 1, "sequences": [{"name": "Short", "simulate": tiny.ROOM}]}
     run(tmp_path / "out", suite=suite)
