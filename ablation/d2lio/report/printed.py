@@ -69,6 +69,8 @@ def _save(figures: Mapping[str, Figure], folder: Path) -> list[Path]:
     folder.mkdir(parents=True, exist_ok=True)
     written = []
     for name, figure in figures.items():
+        figure.draw_without_rendering()
+        figure.set_layout_engine("none")  # as it is now: laying out takes longer than drawing
         for suffix in SUFFIXES:
             file = folder / f"{name}{suffix}"
             figure.savefig(file, dpi=DPI)

@@ -22,6 +22,7 @@ TRUTH_FILE = "truth.tum"
 MIN_PAIRS = 3  # fewer positions give no alignment
 
 Array = np.ndarray
+_truths: dict[tuple[int, ...], Trajectory] = {}  # the last one read, by what tells its file apart
 
 
 @dataclass(slots=True)
@@ -53,8 +54,8 @@ def read_series(directory: Path) -> RunSeries:
     """The curves of a run; a missing or broken file leaves its curves empty (the run failed)."""
     series = RunSeries()
     try:
-        truth = read_tum(directory / TRUTH_FILE)
-    except DataError:
+        truth = _read_truth(directory / TRUTH_FILE)
+    except (OSError, DataError):
         return series
     series.truth = truth.positions
     start = int(truth.stamps[0])
@@ -63,6 +64,16 @@ def read_series(directory: Path) -> RunSeries:
     with suppress(DataError):
         _add_diagnostics(series, read_diagnostics(directory / DIAGNOSTICS_FILE), start)
     return series
+
+
+def _read_truth(file: Path) -> Trajectory:
+    """The truth; the variants of a sequence share its file by hard links, and it is read once."""
+    about = file.stat()
+    key = about.st_dev, about.st_ino, about.st_mtime_ns, about.st_size
+    if key not in _truths:
+        _truths.clear()
+        _truths[key] = read_tum(file)
+    return _truths[key]
 
 
 def _add_path(series: RunSeries, truth: Trajectory, estimate: Trajectory) -> None:

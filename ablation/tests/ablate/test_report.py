@@ -281,3 +281,15 @@ def test_a_saved_map_is_preferred(tmp_path: Path) -> None:
     assert cloud.load_map(tmp_path, sequence, 0, np.zeros((2, 3))).shape == (5, 3)
     recorded = sequence.model_copy(update={"name": "other", "simulate": None})
     assert cloud.load_map(tmp_path, recorded, 0, np.zeros((2, 3))).shape == (0, 3)
+
+
+def test_a_truth_is_that_of_its_own_run(tmp_path: Path) -> None:
+    places = [tmp_path / name for name in ("a", "b", "c")]
+    for place, x in zip(places, (1, 1, 2), strict=True):
+        place.mkdir()
+        if place.name == "b":
+            (place / "truth.tum").hardlink_to(tmp_path / "a/truth.tum")
+        else:
+            (place / "truth.tum").write_text(f"1 {x} 0 0 0 0 0 1\n")
+    found = [read_series(place).truth[0, 0] for place in (*places, places[0])]
+    assert found == [1.0, 1.0, 2.0, 1.0]
