@@ -8,6 +8,9 @@ really lies was measured for each pipeline (`SHIFTS`).
 
 from __future__ import annotations
 
+import os
+import threading
+import time
 from typing import Any
 
 import numpy as np
@@ -18,6 +21,12 @@ from evalio_cloud import Grid, to_stamp
 
 # In sweeps. Without de-skew a pose is that of the sweep's middle. LIO-SAM holds two clouds back.
 SHIFTS = {"loam": 0.5, "ct": 0.0, "dlio": 0.5, "liosam": -1.5}
+# DLIO builds its submap in a thread and takes it up when it happens to be done: the result would
+# depend on the machine's load. In a scan's time it always is done, so we wait for that.
+IN_BACKGROUND = ("dlio",)
+SETTLED_S = 1.0  # at most
+POLL_S = 0.0002
+TASKS = "/proc/self/task"  # Linux; elsewhere there is nothing to see and nothing is waited for
 THREADS = ("num_threads", "numberOfCores", "max_num_threads", "ls_num_threads")
 OWN_KEYS = ("pipeline",)
 NOISE = {"gyro": 1.5e-3, "accel": 4e-3, "gyro_bias": 3.5e-5, "accel_bias": 6.4e-5}
@@ -65,6 +74,8 @@ class Evalio(Driver):
             for sample in samples:
                 self._pipeline.add_imu(sample)
             self._pipeline.add_lidar(cloud)
+            if self._name in IN_BACKGROUND:
+                _wait_for_threads()
         return self._poses()
 
     def _poses(self) -> list[Pose]:
@@ -81,6 +92,30 @@ class Evalio(Driver):
         if int(ring.max()) >= self._grid.rows:
             raise RefusedError(f"ring {int(ring.max())} of a LiDAR with {self._grid.rows}")
         return self._grid.cloud(scan.stamp, scan.xyz, scan.dt_ns, scan.intensity, ring)
+
+
+def _wait_for_threads() -> None:
+    """Until no other thread of this process wants to run, seen twice."""
+    end = time.perf_counter() + SETTLED_S
+    quiet = 0
+    while quiet < 2 and time.perf_counter() < end:
+        quiet = 0 if _another_runs() else quiet + 1
+        time.sleep(POLL_S)
+
+
+def _another_runs() -> bool:
+    own = str(threading.get_native_id())
+    for task in os.listdir(TASKS) if os.path.isdir(TASKS) else ():
+        if task == own:
+            continue
+        try:
+            with open(f"{TASKS}/{task}/stat", encoding="ascii", errors="replace") as file:
+                state = file.read().rpartition(")")[2].split()[0]
+        except OSError:
+            continue  # it has ended
+        if state in "RD":
+            return True
+    return False
 
 
 def _measurements(rows: ImuRows) -> list[Any]:
