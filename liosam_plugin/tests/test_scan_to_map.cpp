@@ -9,6 +9,7 @@
 #include <string>
 
 #include "d2lio/diagnostics/scan_diagnostics.hpp"
+#include "d2lio/geometry/plane.hpp"
 #include "d2lio/geometry/so3.hpp"
 #include "line_fit.hpp"
 #include "scan_to_map.hpp"
@@ -107,6 +108,23 @@ TEST(ScanToMap, FindsThePoseWithEveryModeAndMethod) {
             EXPECT_FALSE(run.report.degenerate);
         }
     }
+}
+
+/// A ring on a wall: its five points lie on a line but for their noise.
+TEST(ScanToMap, NeighboursOnALineHaveAPlaneInLioSamOnly) {
+    Box box;
+    Cloud ring;
+    for (int i = 0; i < 3; ++i) ring.emplace_back(0.F, 0.3F * float(i), 0.F);
+    ring.emplace_back(0.F, 0.9F, 1e-4F);
+    ring.emplace_back(1e-4F, 1.2F, 0.F);
+    for (Eigen::Vector3f& p : ring) p += Eigen::Vector3f(5.F, 0.F, 1.F);
+    box.wall_map.build(ring);
+    const Cloud scan = box.seen(ring, 1);
+    Matching run(box, {}, scan, box.truth);
+    EXPECT_EQ(run.diagnostics.counts.singular_plane, 0);
+    box.options.min_spread_ratio = PlaneFitOptions{}.min_spread_ratio;
+    run = Matching(box, {}, scan, box.truth);
+    EXPECT_EQ(run.diagnostics.counts.singular_plane, 3);  // the ends have neighbours too far away
 }
 
 TEST(ScanToMap, CornersAloneFixAPose) {

@@ -6,6 +6,7 @@
 
 #include "config.hpp"
 #include "correction.hpp"
+#include "d2lio/geometry/plane.hpp"
 #include "d2lio/host/stop_watch.hpp"
 #include "d2lio/preprocess/deskew.hpp"
 #include "front_end.hpp"
@@ -28,7 +29,10 @@ HostConfig load(Preset preset, const ParamMap& params, int threads, Adapter& ada
     config.threads = threads;
     config.validate();
     finish_configuration(adapter, config.surface_leaf);
-    if (config.front_end == FrontEnd::kDirect) config.matching.kernel_scale = config.kernel_scale;
+    if (config.front_end == FrontEnd::kDirect) {
+        config.matching.kernel_scale = config.kernel_scale;
+        config.matching.min_spread_ratio = PlaneFitOptions{}.min_spread_ratio;
+    }
     return config;
 }
 

@@ -6,6 +6,8 @@
 #include <cmath>
 #include <limits>
 
+#include "d2lio/geometry/plane.hpp"
+
 namespace d2lio::liosam {
 namespace {
 
@@ -18,6 +20,7 @@ MatchOptions alignment() {
     o.max_iterations = 100;
     o.eigenvalue_threshold = 0.0;
     o.kernel_scale = kKernel;
+    o.min_spread_ratio = PlaneFitOptions{}.min_spread_ratio;
     return o;
 }
 

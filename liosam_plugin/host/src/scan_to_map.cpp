@@ -78,6 +78,7 @@ bool ScanToMap::fit(Feature feature, std::size_t index, const Neighbours& near,
     Plane plane;
     PlaneFitOptions options;
     options.max_distance = kPlaneDistance;
+    options.min_spread_ratio = options_.min_spread_ratio;
     const PlaneStatus status = fit_plane(xyz, kStride, kNeighbours, options, plane);
     if (status == PlaneStatus::kSingular) adapter_.mark_singular(feature, index);
     if (status != PlaneStatus::kOk) return false;

@@ -22,6 +22,8 @@ struct MatchOptions {
     /// Scale of the Cauchy kernel, m. 0: LIO-SAM's weight, which falls with the distance and rises
     /// with the square root of the range.
     double kernel_scale = 0.0;
+    /// Of PlaneFitOptions; 0: neighbours on a line have a plane too, as in LIO-SAM.
+    double min_spread_ratio = 0.0;
 };
 
 enum class MatchStatus {
