@@ -108,6 +108,12 @@
       const data = meta.outcomes.map((label, k) => ({ name: label, y: names, x: kept.map(([, run]) => 100 * (run.o[k] || 0)) }));
       return bars("Correspondences by outcome", "share [%]", data, meta.outcome_colours);
     },
+    ranges: function () {
+      const data = runs().filter(([, run]) => run.b).map(([i, run]) =>
+        Object.assign(line(i, meta.ranges, run.b.map((v) => (v === null ? null : 100 * v))), { mode: "lines+markers" }));
+      return { data: data, layout: plain("Rejected, by the point's distance", "", "rejected [%]", {
+        xaxis: { type: "category", categoryarray: meta.ranges, automargin: true } }) };
+    },
     stages: function () {
       const kept = meta.timing.map((t, i) => [i, t]).filter(([i, t]) => shown.has(i) && t.stages);
       const names = kept.map(([i]) => meta.variants[i].title);

@@ -22,6 +22,31 @@ OUTCOMES = {
     "rejected_residual": "residual",
 }
 
+# Distances of points from the body: ending of the columns offered_..., accepted_..., and name.
+RANGES = {
+    "to_5m": "0 to 5 m",
+    "to_10m": "5 to 10 m",
+    "to_20m": "10 to 20 m",
+    "to_40m": "20 to 40 m",
+    "to_80m": "40 to 80 m",
+    "beyond_80m": "over 80 m",
+}
+
+
+def rejected_by_range(columns: dict[str, np.ndarray]) -> list[float | None]:
+    """Share of the correspondences offered that was rejected, [0, 1], for each of RANGES.
+
+    None where nothing was offered; empty for diagnostics without those columns.
+    """
+    shares: list[float | None] = []
+    for ending in RANGES:
+        if f"offered_{ending}" not in columns:
+            return []
+        offered = float(np.nansum(columns[f"offered_{ending}"]))
+        accepted = float(np.nansum(columns[f"accepted_{ending}"]))
+        shares.append(1.0 - accepted / offered if offered > 0.0 else None)
+    return shares if any(share is not None for share in shares) else []
+
 
 def read_diagnostics(file: Path) -> dict[str, np.ndarray]:
     """Numeric columns as float64 [N] (empty cells NaN), the others as text [N].

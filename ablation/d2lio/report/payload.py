@@ -15,7 +15,7 @@ from d2lio.ablate.results import Key, ResultRow, Results
 from d2lio.ablate.suite import Variant
 from d2lio.ablate.tables import POOLED_ID, Table
 from d2lio.report import cloud, palette
-from d2lio.report.diagnostics import OUTCOMES
+from d2lio.report.diagnostics import OUTCOMES, RANGES
 from d2lio.report.embed import pack, stride
 from d2lio.report.series import RunSeries
 
@@ -58,6 +58,7 @@ def meta(results: Results, tables: Sequence[Table]) -> dict[str, Any]:
         "differences": _differences(tables, places, numbers),
         "outcomes": list(OUTCOMES.values()),
         "outcome_colours": palette.OUTCOME_COLOURS,
+        "ranges": list(RANGES.values()),
         "stages": stages,
         "stage_colours": palette.STAGE_COLOURS,
         "timing": [_timing(results, v.id, stages) for v in variants],
@@ -218,6 +219,8 @@ def _curves(run: RunSeries, points: int) -> dict[str, Any]:
         }
     if run.shares:
         curves["o"] = [round(run.shares.get(label, 0.0), 5) for label in OUTCOMES.values()]
+    if run.rejected_by_range:
+        curves["b"] = [_number(v) if v is not None else None for v in run.rejected_by_range]
     return {key: value for key, value in curves.items() if value is not None}
 
 

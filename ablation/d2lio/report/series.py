@@ -16,7 +16,7 @@ from d2lio.errors import DataError
 from d2lio.metrics.matching import match
 from d2lio.metrics.tum import Trajectory, finite, read_tum
 from d2lio.record import DIAGNOSTICS_FILE, TRAJECTORY_FILE
-from d2lio.report.diagnostics import OUTCOMES, processed, read_diagnostics
+from d2lio.report.diagnostics import OUTCOMES, processed, read_diagnostics, rejected_by_range
 
 TRUTH_FILE = "truth.tum"
 MIN_PAIRS = 3  # fewer positions give no alignment
@@ -37,6 +37,7 @@ class RunSeries:
             whole hides how far a lost run stayed behind. None where the truth has no attitudes.
         t_scan, lambda_t, lambda_r: per processed scan: s [K], smallest eigenvalue of each block.
         shares: of the correspondences offered, by outcome, [0, 1].
+        rejected_by_range: share rejected for each of diagnostics.RANGES; empty where unknown.
     """
 
     truth: Array = field(default_factory=lambda: np.empty((0, 3)))
@@ -48,6 +49,7 @@ class RunSeries:
     lambda_t: Array = field(default_factory=lambda: np.empty(0))
     lambda_r: Array = field(default_factory=lambda: np.empty(0))
     shares: dict[str, float] = field(default_factory=dict)
+    rejected_by_range: list[float | None] = field(default_factory=list)
 
 
 def read_series(directory: Path) -> RunSeries:
@@ -125,3 +127,4 @@ def _add_diagnostics(series: RunSeries, columns: dict[str, Array], start_ns: int
             for key, label in OUTCOMES.items()
             if key in columns
         }
+        series.rejected_by_range = rejected_by_range(columns)

@@ -11,6 +11,7 @@ import numpy as np
 from d2lio.ablate.results import SUITE_FILE, ResultRow, Results, TimingRow, save
 from d2lio.ablate.suite import Suite, slug
 from d2lio.output import tum_line
+from d2lio.report.diagnostics import RANGES
 
 START_NS = 1_700_000_000_000_000_000
 PATH_M = 60.0
@@ -153,6 +154,7 @@ def _write_diagnostics(
     if full:
         header += ["offered", "accepted", "rejected_threshold", "rejected_plane_fit"]
         header += ["lambda_r_1", "lambda_t_1"]
+        header += [f"{kind}_{ending}" for ending in RANGES for kind in ("offered", "accepted")]
     with file.open("w", newline="", encoding="utf-8") as stream:
         writer = csv.writer(stream, lineterminator="\n")
         writer.writerow(header)
@@ -161,4 +163,5 @@ def _write_diagnostics(
             if full:
                 line += [1000, 800, 150, 50, f"{rng.uniform(50, 500):.2f}"]
                 line += [f"{rng.uniform(5, 50):.2f}"]
+                line += [400, 380, 300, 240, 200, 140, 100, 40, 0, 0, 0, 0]
             writer.writerow(line)

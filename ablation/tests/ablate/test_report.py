@@ -94,6 +94,7 @@ def test_curves_survive_their_packing(page: str, results: Results) -> None:
     assert embed.unpack(curves["e"]) == pytest.approx(given.error, rel=1e-3)
     assert embed.unpack(curves["lt"]) == pytest.approx(given.lambda_t, rel=1e-3)
     assert curves["o"][0] == pytest.approx(0.8)  # accepted of offered
+    assert curves["b"] == pytest.approx([0.05, 0.2, 0.3, 0.6, None, None])
     assert len(embed.unpack(data["map"]["x"])) == cloud.POINTS
 
 

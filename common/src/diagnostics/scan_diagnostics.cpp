@@ -18,6 +18,17 @@ void add_counts(const CorrespondenceCounts& c, Columns& out) {
     out.emplace_back("rejected_residual", c.residual);
 }
 
+/// offered_to_5m, accepted_to_5m, ... offered_beyond_80m, accepted_beyond_80m.
+void add_ranges(const RangeCounts& c, Columns& out) {
+    for (std::size_t i = 0; i < c.offered.size(); ++i) {
+        const bool last = i == kRangeEdges.size();
+        const int edge = static_cast<int>(last ? kRangeEdges.back() : kRangeEdges[i]);
+        const std::string bin = (last ? "_beyond_" : "_to_") + std::to_string(edge) + "m";
+        out.emplace_back("offered" + bin, c.offered[i]);
+        out.emplace_back("accepted" + bin, c.accepted[i]);
+    }
+}
+
 void add_vector(const std::string& name, const Vec3& v, Columns& out) {
     for (int i = 0; i < 3; ++i) out.emplace_back(name + "_" + std::to_string(i + 1), v[i]);
 }
@@ -67,6 +78,7 @@ Columns ScanDiagnostics::columns() const {
     out.emplace_back("correction_weak_t", correction_weak_t);
     out.emplace_back("iterations", iterations);
     out.emplace_back("converged", converged ? 1.0 : 0.0);
+    add_ranges(by_range, out);
     return out;
 }
 

@@ -11,6 +11,7 @@ namespace d2lio {
 void VerdictBook::begin_scan(std::size_t points) {
     verdicts_.assign(points, Verdict::kFewNeighbours);
     thresholds_.assign(points, std::numeric_limits<float>::infinity());
+    ranges_.assign(points, std::numeric_limits<float>::quiet_NaN());
 }
 
 CorrespondenceCounts VerdictBook::counts() const {
@@ -19,6 +20,19 @@ CorrespondenceCounts VerdictBook::counts() const {
                            &c.singular_plane, &c.plane_fit,      &c.residual};
     for (const Verdict v : verdicts_) ++*fields[static_cast<std::size_t>(v)];
     c.offered = static_cast<int>(verdicts_.size());
+    return c;
+}
+
+RangeCounts VerdictBook::counts_by_range() const {
+    RangeCounts c;
+    for (std::size_t i = 0; i < verdicts_.size(); ++i) {
+        const auto range = static_cast<double>(ranges_[i]);
+        if (std::isnan(range)) continue;
+        std::size_t bin = 0;
+        while (bin < kRangeEdges.size() && range >= kRangeEdges[bin]) ++bin;
+        ++c.offered[bin];
+        if (verdicts_[i] == Verdict::kAccepted) ++c.accepted[bin];
+    }
     return c;
 }
 

@@ -134,6 +134,7 @@ Status Adapter::end_scan(const PoseView& posterior, bool converged, double* cova
         status = impl_->remove_prior(covariance, size);
     }
     core().current.counts = impl_->gate.book().counts();
+    core().current.by_range = impl_->gate.book().counts_by_range();
     impl_->gate.book().threshold_statistics(core().current);
     core().publish();
     return status;

@@ -41,7 +41,10 @@ Verdict Gate::fit(const Candidate& c, const Rejector& rejector) {
 Verdict Gate::accept(const Candidate& c, const Rejector& rejector, Correspondence* out) {
     if (c.index >= book_.size()) return Verdict::kFewNeighbours;
     Verdict& verdict = book_.verdict(c.index);
-    if (c.fresh) verdict = fit(c, rejector);
+    if (c.fresh) {
+        book_.set_range(c.index, c.imu_range);
+        verdict = fit(c, rejector);
+    }
     if (verdict != Verdict::kAccepted) return verdict;
 
     const Plane& plane = planes_[c.index];

@@ -94,6 +94,7 @@ Status Adapter::begin_scan(const ScanInput& input) {
 float Adapter::gate(const Candidate& c) {
     const std::size_t slot = impl_->slot(c.feature, c.index);
     if (slot >= impl_->book.size()) return kReject;
+    impl_->book.set_range(slot, c.range);
     Verdict& verdict = impl_->book.verdict(slot);
     verdict = Verdict::kFewNeighbours;
     if (c.neighbour_count < kNeighbours) return kReject;
@@ -188,6 +189,7 @@ bool Adapter::degenerate() const { return impl_->degenerate; }
 Status Adapter::end_scan(const PoseView& estimate, bool converged) {
     const Status status = core().end(to_pose(estimate), converged);
     core().current.counts = impl_->book.counts();
+    core().current.by_range = impl_->book.counts_by_range();
     impl_->book.threshold_statistics(core().current);
     core().publish();
     return status;

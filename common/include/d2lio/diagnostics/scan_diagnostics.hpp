@@ -2,6 +2,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
+#include <array>
 #include <cstdint>
 #include <limits>
 #include <string>
@@ -34,9 +35,17 @@ struct CorrespondenceCounts {
     int residual = 0;        ///< host gate on the point-to-plane distance
 };
 
+/// The correspondences by the distance of their points from the body: bin i holds what is nearer
+/// than kRangeEdges[i], the last one the rest.
+constexpr std::array<double, 5> kRangeEdges{5.0, 10.0, 20.0, 40.0, 80.0};  ///< m
+struct RangeCounts {
+    std::array<int, kRangeEdges.size() + 1> offered{}, accepted{};
+};
+
 /// What a scan says about itself: correspondences, thresholds, spectrum, prior, correction.
 struct ScanDiagnostics {
     CorrespondenceCounts counts;
+    RangeCounts by_range;
     double epsilon_min = kNaN, epsilon_median = kNaN, epsilon_max = kNaN;  ///< thresholds, m
     double sigma = kNaN;                                                   ///< KISS, m
     Vec3 lambda_r = Vec3::Constant(kNaN);  ///< rotation eigenvalues, ascending, m^2

@@ -10,7 +10,7 @@
 
 namespace d2lio {
 
-/// Verdict and threshold of every point of one scan. Threads may write different points at a time.
+/// Verdict, threshold and range of every point of one scan. Threads may write different points at a time.
 class VerdictBook {
   public:
     void begin_scan(std::size_t points);
@@ -20,13 +20,18 @@ class VerdictBook {
         thresholds_[i] = static_cast<float>(threshold);
     }
 
+    /// @param range of the point from the body, m.
+    void set_range(std::size_t i, double range) { ranges_[i] = static_cast<float>(range); }
+
     CorrespondenceCounts counts() const;
+    /// The points whose range was set.
+    RangeCounts counts_by_range() const;
     /// Minimum, median and maximum of the thresholds used; NaN where none was finite.
     void threshold_statistics(ScanDiagnostics& out);
 
   private:
     std::vector<Verdict> verdicts_;
-    std::vector<float> thresholds_;
+    std::vector<float> thresholds_, ranges_;
 };
 
 }  // namespace d2lio
