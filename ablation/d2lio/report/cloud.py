@@ -48,12 +48,10 @@ def load_map(out: Path, sequence: SuiteSequence, repeat: int, truth: np.ndarray)
 
 def scene_map(what: Simulate, repeat: int, truth: np.ndarray) -> np.ndarray:
     """Points of a simulated scene that rays from the path hit, float32 [N, 3], m."""
-    from d2lio.simulator.pipeline import SCENES, _rng
+    from d2lio.simulator.pipeline import Seeds, build_world
 
-    scene = SCENES[what.scene]
     seed = what.seed_base + repeat
-    streams = (_rng(what.scene, stream, seed) for stream in ("scene", "motion"))
-    world = scene.build(*streams, what.duration or scene.duration)
+    world = build_world(what.scene, Seeds(seed, seed, seed), what.duration)
     rng = np.random.default_rng(SEED)
     places = truth[np.linspace(0, len(truth) - 1, STATIONS).astype(int)]
     origin = np.repeat(places, 2 * POINTS // STATIONS, axis=0)

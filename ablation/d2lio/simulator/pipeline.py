@@ -107,9 +107,7 @@ def simulate(
     sigma = _number("range_noise", lidar.range_noise if range_noise is None else range_noise,
                     0.0, 10.0)  # fmt: skip
     seeds = _seeds(seed)
-    world = spec.build(
-        _rng(scene, "scene", seeds.scene), _rng(scene, "motion", seeds.motion), length
-    )
+    world = build_world(scene, seeds, length)
     sequence = _describe(f"{scene}_{sensor}_s{seeds.noise}", lidar, sensor, grade)
     scans = scan_world(world, lidar, sigma, _rng(scene, "range", seeds.noise), length)
     samples = _imu_samples(world.trajectory, grade, scene, seeds, length, orientation)
@@ -122,6 +120,25 @@ def simulate(
     target = Path(out)
     _replace_directory(target, write)
     return Sequence.load(target)
+
+
+def build_world(scene: str, seeds: Seeds, duration: float | None = None) -> World:
+    """The scene and the trajectory of a sequence, as `simulate` makes them.
+
+    Args:
+        scene: a key of SCENES.
+        seeds: of the scene's detail and of the motion.
+        duration: s; None takes the scene's own.
+
+    Raises:
+        ConfigError: the name is unknown.
+    """
+    spec = _choose("scene", scene, SCENES)
+    return spec.build(
+        _rng(scene, "scene", seeds.scene),
+        _rng(scene, "motion", seeds.motion),
+        spec.duration if duration is None else duration,
+    )
 
 
 def scan_world(
