@@ -36,7 +36,7 @@ class Estimate:
         self._sequences_left += 1
 
     def learn(self, variant: str, seconds: float | None) -> None:
-        """What a cell took, be it in an earlier session."""
+        """What a cell took, be it in an earlier run of the suite."""
         if seconds is not None:
             self._seconds[variant].append(seconds)
 
