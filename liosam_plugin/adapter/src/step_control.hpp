@@ -7,7 +7,7 @@
 namespace d2lio::liosam {
 
 /// Ends the limit cycles of scan matching. Correspondences that flip between two iterations keep
-/// some scans (one in ten of a room) stepping to and fro until the iterations run out. After
+/// some scans (one in ten of a room) stepping back and forth until the iterations run out. After
 /// kFreeIterations, each step that turns back against the one before, in the metric of the normal
 /// equations, halves all further steps of the scan, which then converges where it oscillates.
 class StepControl {

@@ -85,7 +85,7 @@ struct Equations {
 };
 
 /// The step of iteration i of a scan whose correspondences flip.
-Matrix to_and_fro(int i) {
+Matrix back_and_forth(int i) {
     Matrix step(1);
     step.at<float>(4, 0) = i % 2 == 0 ? 0.01F : -0.01F;
     return step;
@@ -128,7 +128,7 @@ TEST(UpstreamGlue, WithoutParametersLeavesEverythingToUpstream) {
     glue.condition(kPose.data(), eq.AtA, eq.Atb);
     EXPECT_TRUE(eq.AtA == before.AtA && eq.Atb == before.Atb);
     for (int i = 0; i < 12; ++i) {
-        Matrix step = to_and_fro(i), same = step;
+        Matrix step = back_and_forth(i), same = step;
         glue.restore(eq.AtA, eq.Atb, step);
         EXPECT_TRUE(step == same);
     }
@@ -231,7 +231,7 @@ TEST(UpstreamGlue, ThePriorIsInTheSolveButNotInTheEigenvalueTest) {
     EXPECT_TRUE(glue.has_prior());
     EXPECT_GT(eq.AtA.at<float>(3, 3), 100.F * Equations().AtA.at<float>(3, 3));
     EXPECT_LT(eq.Atb.at<float>(3, 0), 0.F);  // back to the guess
-    Matrix step = to_and_fro(0), same = step;
+    Matrix step = back_and_forth(0), same = step;
     glue.restore(eq.AtA, eq.Atb, step);
     EXPECT_TRUE(eq.AtA == before.AtA && eq.Atb == before.Atb && step == same);
     EXPECT_TRUE(glue.end_scan(moved.data(), false));  // our verdict on the scan's own rows
@@ -240,7 +240,7 @@ TEST(UpstreamGlue, ThePriorIsInTheSolveButNotInTheEigenvalueTest) {
     EXPECT_NEAR(test::stamp_of(messages[1].second), 10.4, 1e-6);
 }
 
-/// Upstream's loop ends when a step is small enough: one that steps to and fro must come there.
+/// Upstream's loop ends when a step is small enough: one that steps back and forth must come there.
 TEST(UpstreamGlue, AModeShortensTheStepsOfAScanThatOscillates) {
     Host host;
     test::set(node_of(host), "rejection/mode", "none");
@@ -251,7 +251,7 @@ TEST(UpstreamGlue, AModeShortensTheStepsOfAScanThatOscillates) {
     for (int i = 0; i < 15; ++i) {
         Equations eq;
         glue.condition(kPose.data(), eq.AtA, eq.Atb);
-        Matrix step = to_and_fro(i);
+        Matrix step = back_and_forth(i);
         glue.restore(eq.AtA, eq.Atb, step);
         last = std::abs(step.at<float>(4, 0));
         EXPECT_TRUE(i >= 6 || last == 0.01F) << i;

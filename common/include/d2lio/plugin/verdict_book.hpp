@@ -10,7 +10,8 @@
 
 namespace d2lio {
 
-/// Verdict, threshold and range of every point of one scan. Threads may write different points at a time.
+/// Verdict, threshold and range of every point of one scan. Threads may write different points at a
+/// time.
 class VerdictBook {
   public:
     void begin_scan(std::size_t points);

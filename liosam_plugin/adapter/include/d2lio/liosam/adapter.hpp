@@ -72,7 +72,7 @@ class Adapter : public Plugin {
     Status condition_tangent(const PoseView& pose, double variance,
                              const NormalEquations& equations);
     /// What to multiply the solved step by, once an iteration: 1, or less after a scan has begun to
-    /// step to and fro. Always 1 where the host's own gates decide.
+    /// step back and forth. Always 1 where the host's own gates decide.
     /// @param step 6 numbers; @param AtA 6 x 6 of the same variables, with or without the prior.
     double step_factor(const double* step, const double* AtA);
     /// Whether some direction of the last conditioned equations is weak, judged on the scan's own

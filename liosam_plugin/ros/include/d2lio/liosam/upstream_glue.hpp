@@ -139,7 +139,7 @@ class UpstreamGlue {
     }
 
     /// The normal equations as the scan alone made them, for upstream's eigenvalue test; a shorter
-    /// step (6 x 1) where the scan has begun to step to and fro.
+    /// step (6 x 1) where the scan has begun to step back and forth.
     template <class Mat>
     void restore(Mat& AtA, Mat& Atb, Mat& step) {
         if (changed_) write(kept_A_, kept_b_, AtA, Atb);
