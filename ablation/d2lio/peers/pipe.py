@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 D2-LIO contributors
 # SPDX-License-Identifier: BSD-3-Clause
-"""The process of a peer, and messages back and forthm it that never wait for ever."""
+"""The process of a peer, and messages to and from it that never wait for ever."""
 
 from __future__ import annotations
 
