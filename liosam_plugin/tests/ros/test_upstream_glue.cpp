@@ -246,7 +246,8 @@ TEST(UpstreamGlue, AModeShortensTheStepsOfAScanThatOscillates) {
     test::set(node_of(host), "rejection/mode", "none");
     UpstreamGlue glue;
     glue.configure(host);
-    begin_third_scan(glue, host, kPose.data());
+    glue.before_guess(10.0, kPose.data());  // without a prior it asks for no IMU
+    glue.begin_scan(kPose.data(), 10, 100);
     float last = 0.F;
     for (int i = 0; i < 15; ++i) {
         Equations eq;
