@@ -91,7 +91,7 @@ Matrix back_and_forth(int i) {
     return step;
 }
 
-constexpr std::array<float, 6> kPose{0.02F, -0.03F, 1.1F, 5.F, 6.F, 0.5F};
+std::array<float, 6> kPose{0.02F, -0.03F, 1.1F, 5.F, 6.F, 0.5F};
 
 void feed_imu(Host& host, double from, double to) {
     for (int i = 0; from + 0.01 * i <= to; ++i) {
@@ -100,7 +100,7 @@ void feed_imu(Host& host, double from, double to) {
 }
 
 /// Two scans up to the matching of the third: the first made the map.
-void begin_third_scan(UpstreamGlue& glue, Host& host, const float* guess) {
+void begin_third_scan(UpstreamGlue& glue, Host& host, float* guess) {
     feed_imu(host, 10.0, 10.45);
     glue.before_guess(10.0, kPose.data());
     glue.before_guess(10.2, kPose.data());
@@ -240,6 +240,24 @@ TEST(UpstreamGlue, ThePriorIsInTheSolveButNotInTheEigenvalueTest) {
     EXPECT_NEAR(test::stamp_of(messages[1].second), 10.4, 1e-6);
 }
 
+/// Its search ends the node on a point that is no number.
+TEST(UpstreamGlue, AModeReplacesAPoseThatIsNoNumber) {
+    Host host;
+    test::set(node_of(host), "rejection/mode", "kiss");
+    UpstreamGlue glue;
+    glue.configure(host);
+    glue.before_guess(10.0, kPose.data());
+    glue.begin_scan(kPose.data(), 10, 100);
+    std::array<float, 6> lost = kPose;
+    lost[4] = std::nanf("");
+    glue.end_scan(lost.data(), false);
+    EXPECT_EQ(lost, kPose);
+    lost[0] = kInfinity;
+    glue.before_guess(10.2, kPose.data());
+    glue.begin_scan(lost.data(), 10, 100);
+    EXPECT_EQ(lost, kPose);
+}
+
 /// Upstream's loop ends when a step is small enough: one that steps back and forth must come there.
 TEST(UpstreamGlue, AModeShortensTheStepsOfAScanThatOscillates) {
     Host host;
@@ -258,6 +276,12 @@ TEST(UpstreamGlue, AModeShortensTheStepsOfAScanThatOscillates) {
         EXPECT_TRUE(i >= 6 || last == 0.01F) << i;
     }
     EXPECT_LT(last, 1e-4F);
+    Equations eq;
+    Matrix step = back_and_forth(0);
+    step.at<float>(1, 0) = std::nanf("");
+    glue.condition(kPose.data(), eq.AtA, eq.Atb);
+    glue.restore(eq.AtA, eq.Atb, step);
+    EXPECT_TRUE(step == Matrix(1));  // no step at all
 }
 
 /// A pose that is no number cannot be conditioned: upstream's step stays as it is.

@@ -80,9 +80,11 @@ class UpstreamGlue {
         stamp_ = stamp;
     }
 
-    /// @param guess of this scan. @param corners, surfaces that will be offered.
-    void begin_scan(const float* guess, int corners, int surfaces) {
+    /// @param guess of this scan; one that is not finite is replaced by the last pose, for it would
+    /// end the node in its search. @param corners, surfaces that will be offered.
+    void begin_scan(float* guess, int corners, int surfaces) {
         if (!active()) return;
+        if (changes_) keep_finite(guess);
         const PoseCopy predicted = copy_of(guess);
         double P[36] = {};
         for (int i = 0; i < 6; ++i) P[7 * i] = 1.0;  // only a prior looks at it
@@ -139,27 +141,34 @@ class UpstreamGlue {
     }
 
     /// The normal equations as the scan alone made them, for upstream's eigenvalue test; a shorter
-    /// step (6 x 1) where the scan has begun to step back and forth.
+    /// step (6 x 1) where the scan has begun to step back and forth, none where it is not finite.
     template <class Mat>
     void restore(Mat& AtA, Mat& Atb, Mat& step) {
         if (changed_) write(kept_A_, kept_b_, AtA, Atb);
-        if (!adapter_.rejects()) return;
+        if (!changes_) return;
         double A[36], d[6];
+        bool finite = true;
         for (int i = 0; i < 36; ++i) A[i] = static_cast<double>(kept_A_[i]);
-        for (int i = 0; i < 6; ++i) d[i] = static_cast<double>(step.template at<float>(i, 0));
-        const auto factor = static_cast<float>(adapter_.step_factor(d, A));
+        for (int i = 0; i < 6; ++i) {
+            d[i] = static_cast<double>(step.template at<float>(i, 0));
+            finite = finite && std::isfinite(d[i]);
+        }
+        const auto factor = static_cast<float>(finite ? adapter_.step_factor(d, A) : 0.0);
         if (factor == 1.0F) return;
-        for (int i = 0; i < 6; ++i) step.template at<float>(i, 0) *= factor;
+        for (int i = 0; i < 6; ++i)
+            step.template at<float>(i, 0) = factor * float(finite ? d[i] : 0);
     }
 
     /// Whether a prior has decided on the weak directions of this step.
     bool has_prior() const { return changed_; }
 
-    /// @param degenerate upstream's own verdict. @returns the one to publish.
-    bool end_scan(const float* pose, bool degenerate) {
+    /// @param pose estimate; as in begin_scan. @param degenerate upstream's own verdict.
+    /// @returns the one to publish.
+    bool end_scan(float* pose, bool degenerate) {
         degenerate_ = degenerate;
         matched_ = true;
         if (!active()) return degenerate;
+        if (changes_) keep_finite(pose);
         const PoseCopy estimate = copy_of(pose);
         // Upstream leaves its loop early only when it has converged.
         adapter_.end_scan(estimate.view(), iterations_ > 0 && iterations_ < kMaxIterations);
@@ -186,6 +195,14 @@ class UpstreamGlue {
         }
         rotation_from_rpy(rpy, out.R);
         return out;
+    }
+
+    /// Remembers a finite pose; puts the last one in the place of another.
+    void keep_finite(float* pose) {
+        bool finite = true;
+        for (int i = 0; i < 6; ++i) finite = finite && std::isfinite(pose[i]);
+        for (int i = 0; i < 6; ++i)
+            (finite ? last_finite_ : pose)[i] = (finite ? pose : last_finite_)[i];
     }
 
     template <class Number, class Mat>
@@ -240,7 +257,7 @@ class UpstreamGlue {
     PoseCopy previous_;
     double stamp_ = 0.0;
     int iterations_ = 0;
-    float kept_A_[36] = {}, kept_b_[6] = {};
+    float kept_A_[36] = {}, kept_b_[6] = {}, last_finite_[6] = {};
 };
 
 }  // namespace liosam
