@@ -29,7 +29,7 @@ if TYPE_CHECKING:
     from d2lio.record import RunRecord
 
 DEFAULT_HOST = "fastlio"
-HostOption = Annotated[str, typer.Option(help="fastlio, liosam or d2lio.")]
+HostOption = Annotated[str, typer.Option(help="fastlio, liosam, d2lio, or one of `peers list`.")]
 JsonOption = Annotated[bool, typer.Option("--json", help="Machine-readable result on stdout.")]
 ThreadsOption = Annotated[int, typer.Option(min=1, help="Threads of the estimator.")]
 
