@@ -123,16 +123,28 @@ class ResultWriter:
         self._csv_file.close()
 
 
+def replace_file(path: Path, content: str | bytes) -> None:
+    """Writes a file in one go: it is the former one or whole, whatever happens.
+
+    Raises:
+        OSError: cannot be written; nothing is left of the attempt.
+    """
+    partial = path.with_name(f".{path.name}.tmp")
+    try:
+        partial.write_bytes(content.encode() if isinstance(content, str) else content)
+        os.replace(partial, path)
+    except OSError:
+        partial.unlink(missing_ok=True)
+        raise
+
+
 def write_tum(path: Path, lines: Iterable[str]) -> None:
     """Writes a TUM file in one go.
 
     Raises:
         DataError: cannot be written.
     """
-    partial = path.with_name(f".{path.name}.tmp")
     try:
-        partial.write_text("".join(lines), encoding="utf-8")
-        os.replace(partial, path)
+        replace_file(path, "".join(lines))
     except OSError as err:
-        partial.unlink(missing_ok=True)
         raise DataError(f"{path}: cannot be written: {err.strerror}") from None

@@ -20,7 +20,7 @@ from pydantic import (
     model_validator,
 )
 
-from d2lio.errors import ConfigError, DataError
+from d2lio.strict_yaml import first_complaint, read_yaml
 
 FILE_NAME = "sequence.yaml"
 ROTATION_TOLERANCE = 1e-3  # calibration files round rotations to four decimals or so
@@ -115,7 +115,7 @@ class Sequence(_Strict):
         """
         root = Path(directory)
         file = root / FILE_NAME
-        sequence = cls.parse(_read_yaml(file), where=str(file))
+        sequence = cls.parse(read_yaml(file), where=str(file))
         sequence._root = root
         return sequence
 
@@ -125,7 +125,7 @@ class Sequence(_Strict):
         try:
             return cls.model_validate(data)
         except ValidationError as error:
-            raise _config_error(error, where) from None
+            raise first_complaint(error, where, FILE_NAME, _known_keys, _plain) from None
 
     def save(self, directory: Path | str) -> Path:
         """Write ``sequence.yaml`` into ``directory`` and return its path."""
@@ -157,30 +157,6 @@ class Sequence(_Strict):
         return np.asarray(self.T_imu_lidar, dtype=float)
 
 
-def _read_yaml(file: Path) -> object:
-    try:
-        return yaml.safe_load(file.read_text(encoding="utf-8"))
-    except FileNotFoundError:
-        raise DataError(f"{file}: no such file") from None
-    except (OSError, UnicodeDecodeError, yaml.YAMLError) as error:
-        reason = " ".join(str(error).split())
-        raise DataError(f"{file}: cannot be read: {reason}") from None
-
-
-def _config_error(error: ValidationError, where: str) -> ConfigError:
-    # A misspelt key shows up twice, as missing and as unknown: name the unknown one first.
-    details = sorted(error.errors(), key=lambda item: item["type"] != "extra_forbidden")
-    first = details[0]
-    key = ".".join(str(part) for part in first["loc"]) or FILE_NAME
-    if first["type"] == "extra_forbidden":
-        allowed = f"no such key; known keys: {_known_keys(first['loc'])}"
-    elif first["type"] == "missing":
-        return ConfigError(key, None, "this key is missing and must be given", where)
-    else:
-        allowed = first["msg"].removeprefix("Value error, ")
-    return ConfigError(key, _short(first["input"]), allowed, where)
-
-
 def _known_keys(location: tuple[int | str, ...]) -> str:
     section = {"lidar": LidarInfo, "imu": ImuInfo}.get(str(location[0]), Sequence)
     if len(location) == 1:
@@ -188,8 +164,5 @@ def _known_keys(location: tuple[int | str, ...]) -> str:
     return ", ".join(section.model_fields)
 
 
-def _short(value: object) -> object:
-    if isinstance(value, float) and not math.isfinite(value):
-        return str(value)
-    text = repr(value)
-    return value if len(text) <= 80 else text[:77] + "..."
+def _plain(value: object) -> object:
+    return str(value) if isinstance(value, float) and not math.isfinite(value) else value

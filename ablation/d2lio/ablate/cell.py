@@ -16,6 +16,7 @@ from d2lio.ablate.suite import Limits, Suite, SuiteSequence, Variant, slug
 
 CELL_FILE = "cell.json"
 LOG_FILE = "run.log"
+TRUTH_FILE = "truth.tum"
 RUNS = "runs"
 FORM = 1  # of cell.json and of what is computed; another one makes cells run again
 

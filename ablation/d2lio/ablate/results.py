@@ -10,13 +10,13 @@ from __future__ import annotations
 
 import csv
 import io
-import os
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, fields
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
 from d2lio.errors import DataError
+from d2lio.output import replace_file
 
 if TYPE_CHECKING:
     from d2lio.ablate.suite import Suite
@@ -162,7 +162,7 @@ def write_text(file: Path, text: str) -> None:
         DataError: cannot be written.
     """
     try:
-        _replace(file, text.encode())
+        replace_file(file, text)
     except OSError as err:
         raise DataError(f"{file}: cannot be written: {err.strerror}") from None
 
@@ -231,8 +231,8 @@ def _write(file: Path, types: Mapping[str, type], records: Sequence[Mapping[str,
     writer.writeheader()
     writer.writerows({k: _text(record.get(k)) for k in types} for record in records)
     try:
-        _replace(file, text.getvalue().encode())
-        _replace(file.with_suffix(".parquet"), _parquet(types, records))
+        replace_file(file, text.getvalue())
+        replace_file(file.with_suffix(".parquet"), _parquet(types, records))
     except OSError as err:
         raise DataError(f"{file}: cannot be written: {err.strerror}") from None
 
@@ -241,12 +241,6 @@ def _text(value: Cell) -> str:
     if value is None:
         return ""
     return repr(float(value)) if isinstance(value, float) else str(value)
-
-
-def _replace(file: Path, content: bytes) -> None:
-    partial = file.with_name(f".{file.name}.tmp")
-    partial.write_bytes(content)
-    os.replace(partial, file)
 
 
 def _parquet(types: Mapping[str, type], records: Sequence[Mapping[str, Cell]]) -> bytes:

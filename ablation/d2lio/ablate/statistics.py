@@ -24,7 +24,7 @@ import numpy as np
 from scipy import stats
 
 from d2lio.ablate.results import ResultRow
-from d2lio.demo import FAIL_PERCENT
+from d2lio.metrics import FAIL_PERCENT
 
 CONFIDENCE = 0.95
 MIN_PAIRS = 5  # the range of fewer values holds their median less often than the confidence says

@@ -20,7 +20,8 @@ from pydantic import (
     model_validator,
 )
 
-from d2lio.errors import ConfigError, DataError
+from d2lio.errors import ConfigError
+from d2lio.strict_yaml import Location, first_complaint, read_yaml
 
 SHIPPED = Path(__file__).parent / "suites"
 SUFFIX = ".yaml"
@@ -220,7 +221,7 @@ class Suite(_Strict):
         try:
             return cls.model_validate(data)
         except ValidationError as error:
-            raise _config_error(error, where) from None
+            raise first_complaint(error, where, "suite", _known_keys, _summary) from None
 
     @classmethod
     def load(cls, file: Path) -> Suite:
@@ -229,13 +230,7 @@ class Suite(_Strict):
         Raises:
             DataError: unreadable; ConfigError: see `parse`.
         """
-        try:
-            data = yaml.safe_load(file.read_text(encoding="utf-8"))
-        except FileNotFoundError:
-            raise DataError(f"{file}: no such file") from None
-        except (OSError, UnicodeDecodeError, yaml.YAMLError) as error:
-            raise DataError(f"{file}: cannot be read: {' '.join(str(error).split())}") from None
-        return cls.parse(data, str(file))
+        return cls.parse(read_yaml(file), str(file))
 
     def to_yaml(self) -> str:
         """The suite as YAML with every value stated; reading it gives the same suite."""
@@ -329,30 +324,17 @@ def load_suite(name: str) -> Suite:
     return Suite.load(Path(name))
 
 
-def _config_error(error: ValidationError, where: str) -> ConfigError:
-    # A misspelt key shows up twice, as missing and as unknown: name the unknown one first.
-    details = sorted(error.errors(), key=lambda item: item["type"] != "extra_forbidden")
-    first = details[0]
-    key = ".".join(str(part) for part in first["loc"]) or "suite"
-    allowed = first["msg"].removeprefix("Value error, ")
-    if first["type"] == "extra_forbidden":
-        allowed = f"no such key; known keys: {', '.join(_known_keys(first['loc']))}"
-    elif first["type"] == "missing":
-        return ConfigError(key, None, "this key is missing and must be given", where)
-    value = first["input"]
-    if isinstance(value, dict | BaseModel):
-        value = "..."  # the message says what about it is wrong
-    text = repr(value)
-    return ConfigError(key, value if len(text) <= 80 else text[:77] + "...", allowed, where)
+def _summary(value: object) -> object:
+    return "..." if isinstance(value, dict | BaseModel) else value  # the message says what is wrong
 
 
-def _known_keys(location: tuple[int | str, ...]) -> list[str]:
+def _known_keys(location: Location) -> str:
     """Keys of the section that holds the key at `location`."""
     model: type[BaseModel] = Suite
     for part in location[:-1]:
         if isinstance(part, str) and part in model.model_fields:
             model = _model_in(model.model_fields[part].annotation) or model
-    return [field.alias or name for name, field in model.model_fields.items()]
+    return ", ".join(field.alias or name for name, field in model.model_fields.items())
 
 
 def _model_in(annotation: Any) -> type[BaseModel] | None:

@@ -21,9 +21,9 @@ from d2lio.ablate.statistics import (
     pooled,
     summarise,
 )
-from d2lio.demo import FAIL_PERCENT
 from d2lio.errors import DataError
 from d2lio.hosts import SHORT_TITLES
+from d2lio.metrics import FAIL_PERCENT
 from d2lio.metrics.evaluate import MIN_COVERAGE
 
 if TYPE_CHECKING:

@@ -7,7 +7,6 @@ from __future__ import annotations
 import dataclasses
 import json
 import os
-from importlib.util import find_spec
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -30,7 +29,6 @@ if TYPE_CHECKING:
     from d2lio.ablate.ablation import Ablation
     from d2lio.ablate.results import Results
 
-REPORT_MODULE = "d2lio.report.ablation"
 WIDTH_PIPED = 160
 
 
@@ -134,27 +132,18 @@ def _list(as_json: bool) -> None:
 
 def _finish(ablation: Ablation, as_json: bool) -> None:
     from d2lio.ablate.results import RESULTS_FILE
+    from d2lio.report.ablation import write
 
     results = ablation.results
     for text in results.notes:
         note(text)
-    report = _report(results)
+    report = write(results, results.out)
     if as_json:
         _emit(ablation, report)
         return
     _print_tables(results)
     stdout().print(f"results: {tail(results.out / RESULTS_FILE)}", highlight=False, soft_wrap=True)
-    if report is not None:
-        stdout().print(f"report:  {tail(report)}", highlight=False, soft_wrap=True)
-
-
-def _report(results: Results) -> Path | None:
-    if find_spec(REPORT_MODULE) is None:
-        note("this build has no report of ablations")
-        return None
-    from d2lio.report.ablation import write
-
-    return write(results, results.out)
+    stdout().print(f"report:  {tail(report)}", highlight=False, soft_wrap=True)
 
 
 def _print_tables(results: Results) -> None:
@@ -165,13 +154,13 @@ def _print_tables(results: Results) -> None:
     typer.echo(to_text(results, width))
 
 
-def _emit(ablation: Ablation, report: Path | None) -> None:
+def _emit(ablation: Ablation, report: Path) -> None:
     results = ablation.results
     rows = [dataclasses.asdict(row) for row in results.rows]
     data: dict[str, Any] = {
         "suite": results.suite.name,
         "out": str(results.out),
-        "report": None if report is None else str(report),
+        "report": str(report),
         "notes": results.notes,
         "problems": ablation.problems,
         "rows": rows,

@@ -70,7 +70,8 @@ def _emit(result: DemoResult) -> None:
 
 
 def _print(result: DemoResult) -> None:
-    from d2lio.demo import FAIL_PERCENT, REPORT_FILE, RESULTS_FILE, cells
+    from d2lio.demo import REPORT_FILE, RESULTS_FILE, cells
+    from d2lio.metrics import FAIL_PERCENT
 
     table = Table(
         title="ATE \\[m], accepted correspondences, median ms per scan",

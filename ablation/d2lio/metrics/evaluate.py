@@ -17,6 +17,7 @@ from d2lio.metrics import evo_metrics, tum
 from d2lio.metrics.matching import coverage, match
 
 MIN_COVERAGE = 0.95
+FAIL_PERCENT = 5.0  # an ATE beyond this share of the path is shown as `-`, as in the paper
 
 
 class Stats(BaseModel):
@@ -69,6 +70,15 @@ class Evaluation(BaseModel):
     end_error_m: float | None = None
     end_error_percent: float | None = None
     files: dict[str, str] = {}
+
+    @property
+    def lost(self) -> str:
+        """Why the run counts as lost: not scored, or too far off; empty where it does not."""
+        if self.status != "ok":
+            return self.reason
+        if self.ate_percent is None or self.ate_percent <= FAIL_PERCENT:
+            return ""
+        return f"ATE {self.ate_percent:.1f} % of the path, beyond {FAIL_PERCENT:g} %"
 
 
 @dataclass(frozen=True, slots=True)

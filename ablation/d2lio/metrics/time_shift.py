@@ -11,6 +11,7 @@ from scipy.optimize import minimize_scalar
 
 from d2lio.datasets.events import NS_PER_S, Float64
 from d2lio.errors import DataError
+from d2lio.metrics.alignment import aligned_rmse
 from d2lio.metrics.tum import Trajectory, finite, read_tum
 
 LIMIT_S = 0.2
@@ -73,12 +74,3 @@ def _search(dense: Trajectory, sparse: Trajectory, sign: float, limit_s: float) 
 
 def _spread(positions: Float64) -> float:
     return float(np.sqrt(((positions - positions.mean(axis=0)) ** 2).sum(axis=1).mean()))
-
-
-def aligned_rmse(first: Float64, second: Float64) -> float:
-    """RMSE between positions [N, 3], m, after the best rotation and translation."""
-    a, b = first - first.mean(axis=0), second - second.mean(axis=0)
-    U, _, V = np.linalg.svd(a.T @ b)
-    signs = np.diag([1.0, 1.0, np.sign(np.linalg.det(U @ V))])
-    rest = a - b @ (U @ signs @ V).T
-    return float(np.sqrt((rest**2).sum(axis=1).mean()))

@@ -17,9 +17,10 @@ from d2lio.ablate.results import RESULTS_FILE, SUITE_FILE, TIMINGS_FILE, Key, Re
 from d2lio.ablate.suite import Suite, shipped
 from d2lio.ablate.tables import POOLED_ID, Cell, Header, Table, build, metres
 from d2lio.errors import DataError
+from d2lio.output import replace_file
 from d2lio.record import RunRecord
 from d2lio.report import payload
-from d2lio.report.embed import asset, fill, script_json, write_page
+from d2lio.report.embed import asset, fill, script_json
 from d2lio.report.exports import FORMATS, TABLES_DIR, file_stems, write_tables
 from d2lio.report.printed import FIGURES_DIR, write_figures
 from d2lio.report.series import RunSeries, read_series
@@ -39,7 +40,7 @@ def write(results: Results, out: Path) -> Path:
     drawn = write_figures(results, tables, series, out)
     page = out / REPORT_FILE
     values = _texts(results, tables, drawn) | _data(results, tables, series)
-    write_page(page, fill(asset("ablation.html"), values))
+    replace_file(page, fill(asset("ablation.html"), values))
     return page
 
 

@@ -7,11 +7,9 @@ from __future__ import annotations
 import base64
 import json
 import math
-import os
 import re
 from collections.abc import Mapping
 from importlib.resources import files
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -55,13 +53,6 @@ def fill(template: str, values: Mapping[str, str]) -> str:
         return known[name] if name in known else shared[name]()
 
     return _MARK.sub(value, template)
-
-
-def write_page(path: Path, page: str) -> None:
-    """Writes the page in one go."""
-    partial = path.with_name(f".{path.name}.tmp")
-    partial.write_text(page, encoding="utf-8")
-    os.replace(partial, path)
 
 
 def pack(values: np.ndarray, log: bool = False) -> dict[str, Any] | None:

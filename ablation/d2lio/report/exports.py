@@ -6,13 +6,13 @@ from __future__ import annotations
 
 import csv
 import io
-import os
 import re
 from collections.abc import Callable, Iterable
 from itertools import groupby
 from pathlib import Path
 
 from d2lio.ablate.tables import Cell, Header, Table
+from d2lio.output import replace_file
 
 TABLES_DIR = "tables"
 CSV_COLUMNS = (
@@ -159,8 +159,6 @@ def write_tables(name: str, tables: list[Table], out: Path) -> list[Path]:
     for stem, table in zip(file_stems(name, tables), tables, strict=True):
         for suffix, export in FORMATS.items():
             file = folder / f"{stem}{suffix}"
-            partial = folder / f".{file.name}.tmp"
-            partial.write_text(export(table), encoding="utf-8")
-            os.replace(partial, file)
+            replace_file(file, export(table))
             written.append(file)
     return written

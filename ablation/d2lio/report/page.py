@@ -10,9 +10,11 @@ from pathlib import Path
 from typing import Any
 
 from d2lio import __version__
-from d2lio.demo import FAIL_PERCENT, RESULTS_FILE, DemoResult, Scene, cell
+from d2lio.demo import RESULTS_FILE, DemoResult, Scene, cell
+from d2lio.metrics import FAIL_PERCENT
+from d2lio.output import replace_file
 from d2lio.report import figures
-from d2lio.report.embed import asset, fill, script_json, write_page
+from d2lio.report.embed import asset, fill, script_json
 
 
 def _table(result: DemoResult) -> str:
@@ -102,4 +104,4 @@ def write_report(result: DemoResult, path: Path) -> None:
         "VARIANTS": script_json(figures.variant_buttons(result)),
         "SCENES": script_json(scenes),
     }
-    write_page(path, fill(asset("template.html"), values))
+    replace_file(path, fill(asset("template.html"), values))

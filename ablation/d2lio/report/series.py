@@ -11,14 +11,15 @@ from pathlib import Path
 import numpy as np
 from scipy.spatial.transform import Rotation
 
+from d2lio.ablate.cell import TRUTH_FILE
 from d2lio.datasets.events import NS_PER_S
 from d2lio.errors import DataError
+from d2lio.metrics.alignment import align
 from d2lio.metrics.matching import match
 from d2lio.metrics.tum import Trajectory, finite, read_tum
 from d2lio.record import DIAGNOSTICS_FILE, TRAJECTORY_FILE
 from d2lio.report.diagnostics import OUTCOMES, processed, read_diagnostics, rejected_by_range
 
-TRUTH_FILE = "truth.tum"
 MIN_PAIRS = 3  # fewer positions give no alignment
 
 Array = np.ndarray
@@ -92,15 +93,6 @@ def _add_path(series: RunSeries, truth: Trajectory, estimate: Trajectory) -> Non
         R_start, t_start = _align_start(pair.truth, pair.estimate)
         series.restart = (R_start @ R.T, t_start - R_start @ R.T @ t)
     series.error = np.linalg.norm(series.path - pair.truth.positions, axis=1)
-
-
-def align(points: Array, target: Array) -> tuple[Array, Array]:
-    """R [3, 3], t [3] that move points [N, 3] onto their partners (Umeyama 1991, without scale)."""
-    center, goal = points.mean(axis=0), target.mean(axis=0)
-    U, _, Vt = np.linalg.svd((target - goal).T @ (points - center))
-    handed = np.diag([1.0, 1.0, np.sign(np.linalg.det(U @ Vt))])
-    R = U @ handed @ Vt
-    return R, goal - R @ center
 
 
 def _align_start(truth: Trajectory, estimate: Trajectory) -> tuple[Array, Array]:
