@@ -36,6 +36,12 @@ RangeCounts VerdictBook::counts_by_range() const {
     return c;
 }
 
+void VerdictBook::close(ScanDiagnostics& record) {
+    record.counts = counts();
+    record.by_range = counts_by_range();
+    threshold_statistics(record);
+}
+
 void VerdictBook::threshold_statistics(ScanDiagnostics& out) {
     const auto finite_end = std::partition(thresholds_.begin(), thresholds_.end(),
                                            [](float t) { return std::isfinite(t); });

@@ -133,9 +133,7 @@ Status Adapter::end_scan(const PoseView& posterior, bool converged, double* cova
     if (status == Status::kOk && core().degeneracy.inflate_only && covariance != nullptr) {
         status = impl_->remove_prior(covariance, size);
     }
-    core().current.counts = impl_->gate.book().counts();
-    core().current.by_range = impl_->gate.book().counts_by_range();
-    impl_->gate.book().threshold_statistics(core().current);
+    impl_->gate.book().close(core().current);
     core().publish();
     return status;
 }

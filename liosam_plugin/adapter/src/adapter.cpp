@@ -188,9 +188,7 @@ bool Adapter::degenerate() const { return impl_->degenerate; }
 
 Status Adapter::end_scan(const PoseView& estimate, bool converged) {
     const Status status = core().end(to_pose(estimate), converged);
-    core().current.counts = impl_->book.counts();
-    core().current.by_range = impl_->book.counts_by_range();
-    impl_->book.threshold_statistics(core().current);
+    impl_->book.close(core().current);
     core().publish();
     return status;
 }

@@ -2,6 +2,8 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "config.hpp"
 
+#include "d2lio/geometry/plane.hpp"
+
 namespace d2lio::liosam {
 namespace {
 
@@ -124,6 +126,14 @@ SubmapOptions HostConfig::submap_options() const {
     o.corner_leaf = static_cast<float>(corner_leaf);
     o.surface_leaf = static_cast<float>(surface_leaf);
     o.max_clouds = static_cast<std::size_t>(max_clouds);
+    return o;
+}
+
+MatchOptions HostConfig::match_options() const {
+    MatchOptions o = matching;
+    if (front_end == FrontEnd::kFeatures) return o;
+    o.kernel_scale = kernel_scale;
+    o.min_spread_ratio = PlaneFitOptions{}.min_spread_ratio;
     return o;
 }
 

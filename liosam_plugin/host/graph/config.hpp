@@ -31,8 +31,8 @@ struct HostConfig {
     FrontEnd front_end = FrontEnd::kFeatures;
     Deskew deskew = Deskew::kFull;
     ProjectionOptions projection;
-    SubmapOptions submap;  ///< but for the fields that follow
-    MatchOptions matching;
+    SubmapOptions submap;   ///< but for the fields that follow
+    MatchOptions matching;  ///< but for what the front end decides
     ImuGraphOptions imu;
     LoopOptions loop;
     double edge_threshold = 1.0, surface_threshold = 0.1;  ///< m^2, curvature
@@ -53,6 +53,7 @@ struct HostConfig {
     void validate() const;
     FeatureOptions feature_options() const;
     SubmapOptions submap_options() const;
+    MatchOptions match_options() const;
 
   private:
     void bind_loop(ParamTable& table);

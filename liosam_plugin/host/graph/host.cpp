@@ -6,7 +6,6 @@
 
 #include "config.hpp"
 #include "correction.hpp"
-#include "d2lio/geometry/plane.hpp"
 #include "d2lio/host/stop_watch.hpp"
 #include "d2lio/preprocess/deskew.hpp"
 #include "front_end.hpp"
@@ -29,10 +28,6 @@ HostConfig load(Preset preset, const ParamMap& params, int threads, Adapter& ada
     config.threads = threads;
     config.validate();
     finish_configuration(adapter, config.surface_leaf);
-    if (config.front_end == FrontEnd::kDirect) {
-        config.matching.kernel_scale = config.kernel_scale;
-        config.matching.min_spread_ratio = PlaneFitOptions{}.min_spread_ratio;
-    }
     return config;
 }
 
@@ -48,7 +43,7 @@ class Host::Impl {
                     static_cast<float>(config_.corner_leaf),
                     static_cast<float>(config_.surface_leaf)),
           direct_(static_cast<float>(config_.direct_leaf)),
-          matcher_(adapter_, config_.matching, config_.threads),
+          matcher_(adapter_, config_.match_options(), config_.threads),
           map_(config_.submap_options()),
           imu_graph_(config_.imu),
           loops_(config_.loop, config_.threads) {}

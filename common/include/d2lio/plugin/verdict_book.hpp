@@ -27,10 +27,13 @@ class VerdictBook {
     CorrespondenceCounts counts() const;
     /// The points whose range was set.
     RangeCounts counts_by_range() const;
-    /// Minimum, median and maximum of the thresholds used; NaN where none was finite.
-    void threshold_statistics(ScanDiagnostics& out);
+    /// Puts the counts, and minimum, median and maximum of the thresholds used (NaN where none was
+    /// finite), into a record. Ends the scan: the thresholds are in another order afterwards.
+    void close(ScanDiagnostics& record);
 
   private:
+    void threshold_statistics(ScanDiagnostics& out);
+
     std::vector<Verdict> verdicts_;
     std::vector<float> thresholds_, ranges_;
 };
