@@ -7,7 +7,7 @@ from __future__ import annotations
 import fcntl
 import os
 import shutil
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -66,12 +66,30 @@ def ablate(suite: Suite, out: Path, options: AblateOptions, watcher: Watcher) ->
         ConfigError: nothing of the suite can run; DataError: unusable directory or cluster.
         KeyboardInterrupt: Ctrl-C; what is done stays done.
     """
-    _prepare(out, suite)
-    with _locked(out):
-        _sweep(out)
-        plan = make_plan(
+
+    def plan() -> Plan:
+        return make_plan(
             suite, out, data=options.data, imports=options.imports, threads=options.threads
         )
+
+    return carry_out_plan(suite.name, plan, out, options, watcher)
+
+
+def carry_out_plan(
+    name: str, planner: Callable[[], Plan], out: Path, options: AblateOptions, watcher: Watcher
+) -> Ablation:
+    """The same for a plan made otherwise; `planner` is called when the directory is ours.
+
+    Args:
+        name: of the suite.
+
+    Raises:
+        See `ablate`.
+    """
+    _prepare(out, name)
+    with _locked(out):
+        _sweep(out)
+        plan = planner()
         done = {} if options.fresh else _done(plan, out)
         if options.fresh:
             _forget(plan, out)
@@ -106,7 +124,7 @@ def _pool(out: Path, options: AblateOptions) -> Pool:
     return DaskPool(options.scheduler, out)
 
 
-def _prepare(out: Path, suite: Suite) -> None:
+def _prepare(out: Path, name: str) -> None:
     """Makes the directory; one that holds something else is refused."""
     try:
         out.mkdir(parents=True, exist_ok=True)
@@ -115,7 +133,7 @@ def _prepare(out: Path, suite: Suite) -> None:
         raise DataError(f"{out}: cannot be written: {err.strerror}") from None
     if results.SUITE_FILE in entries:
         former = Suite.load(out / results.SUITE_FILE).name
-        if former != suite.name:
+        if former != name:
             raise DataError(f"{out}: holds the suite {former}; choose another --out")
     elif entries - OWN_ENTRIES:
         raise DataError(f"{out}: exists and holds no ablation; choose another --out")

@@ -28,6 +28,9 @@ class CellSpec(BaseModel):
         directory: of the run's files, below the output directory.
         source: sequence directory or recording; where it lies does not matter to the result.
         origin: what the source is: the simulation's parameters, or names and sizes of files.
+        config: for what is not a sequence directory (see `open_source`), empty for none; truth: TUM
+            file instead of the source's own. `origin` tells their contents apart.
+        scored: whether there is a truth to compare with.
         imported: TUM file instead of a run; `imported_hash` is its SHA-256.
         version: of this package; peer_version: of the package behind a peer.
     """
@@ -41,6 +44,9 @@ class CellSpec(BaseModel):
     source: str
     origin: dict[str, Any]
     start_offset_s: float = 0.0
+    config: str = ""
+    truth: str = ""
+    scored: bool = True
     host: str | None = None
     rejection: str | None = None
     degeneracy: str | None = None
@@ -60,6 +66,7 @@ class CellSpec(BaseModel):
     def digest(self) -> str:
         """SHA-256 of all that the result depends on; paths and names are left out."""
         unrelated = {"sequence", "repeat", "variant", "directory", "source", "imported"}
+        unrelated |= {"config", "truth", "scored"}
         data = {"form": FORM} | self.model_dump(mode="json", exclude=unrelated)
         return hashlib.sha256(json.dumps(data, sort_keys=True).encode()).hexdigest()
 

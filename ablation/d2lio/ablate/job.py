@@ -34,12 +34,13 @@ def carry_out(spec: CellSpec, work: Path) -> Outcome:
         ConfigError: the configuration is refused; DataError: unreadable input.
     """
     place = work / RUN_DIRECTORY
-    source = open_source(Path(spec.source))
+    source = open_source(Path(spec.source), Path(spec.config) if spec.config else None)
     record = _import(spec, place) if spec.imported else _run(spec, source, place)
     outcome = Outcome(digest=spec.digest(), scores=Scores(status="ok"))
     if record is not None:
         _note_run(outcome, record, place)
-    _score(outcome, spec, source, record, place)
+    if spec.scored:
+        _score(outcome, spec, source, record, place)
     (place / CELL_FILE).write_text(outcome.model_dump_json(indent=2) + "\n", encoding="utf-8")
     return outcome
 
@@ -70,8 +71,8 @@ def _note_run(outcome: Outcome, record: RunRecord, place: Path) -> None:
     scores.scans_read, scores.scans_processed = record.scans.read, record.scans.processed
     scores.duration_s = record.duration_s
     columns = read_diagnostics(place / DIAGNOSTICS_FILE)
-    scores.lambda_t_min = _median(columns.get("lambda_t_1"))
-    scores.lambda_r_min = _median(columns.get("lambda_r_1"))
+    scores.lambda_t_min = median(columns.get("lambda_t_1"))
+    scores.lambda_r_min = median(columns.get("lambda_r_1"))
     outcome.notes = list(record.notes)
     outcome.costs = _costs(record)
 
@@ -92,7 +93,8 @@ def _costs(record: RunRecord) -> Costs:
     )
 
 
-def _median(values: np.ndarray | None) -> float | None:
+def median(values: np.ndarray | None) -> float | None:
+    """Of the finite numbers of a column; None for a column of texts, or none."""
     if values is None or values.dtype.kind != "f":
         return None
     known = values[np.isfinite(values)]
@@ -112,12 +114,13 @@ def _score(
         estimate = place / AT_TRUTH_FILE
     result, curves = evaluate(estimate, truth, EvaluateOptions(out=place))
     outcome.matched = {name: Path(file).name for name, file in result.files.items()}
-    _note_scores(outcome.scores, result)
+    note_scores(outcome.scores, result)
     if curves is not None:
         outcome.scores.best_time_shift_s = best_time_shift(estimate, truth)
 
 
-def _note_scores(scores: Scores, result: Evaluation) -> None:
+def note_scores(scores: Scores, result: Evaluation) -> None:
+    """Fills in what an evaluation found; a lost run fails."""
     scores.coverage, scores.path_m = result.coverage, result.path_m
     if result.lost:
         scores.fail(result.lost)
@@ -132,8 +135,9 @@ def _note_scores(scores: Scores, result: Evaluation) -> None:
 
 def _truth(spec: CellSpec, source: Source, place: Path, outcome: Outcome) -> GroundTruth | None:
     """Puts the ground truth at `place`; what is known of it where it is a data set's."""
-    if source.ground_truth is not None:
-        _link(source.ground_truth, place)
+    given = Path(spec.truth) if spec.truth else source.ground_truth
+    if given is not None:
+        _link(given, place)
         return None
     recording = Path(spec.source)
     match = recognise(recording, {})

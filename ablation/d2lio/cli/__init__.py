@@ -12,6 +12,7 @@ import typer
 from d2lio import __version__
 from d2lio.cli import (
     commands_ablate,
+    commands_compare,
     commands_datasets,
     commands_demo,
     commands_peers,
@@ -32,6 +33,7 @@ app.command("simulate")(commands_run.simulate)
 app.command("params")(commands_run.params)
 app.command("demo")(commands_demo.demo)
 app.command("ablate")(commands_ablate.ablate)
+app.command("compare")(commands_compare.compare)
 app.add_typer(commands_datasets.app)
 app.add_typer(commands_peers.app)
 
