@@ -34,6 +34,7 @@ app.command("params")(commands_run.params)
 app.command("demo")(commands_demo.demo)
 app.command("ablate")(commands_ablate.ablate)
 app.command("compare")(commands_compare.compare)
+app.command("compare-collect", hidden=True)(commands_compare.collect)
 app.add_typer(commands_datasets.app)
 app.add_typer(commands_peers.app)
 

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 D2-LIO contributors
 # SPDX-License-Identifier: BSD-3-Clause
-"""The command compare."""
+"""The commands compare, compare-collect and launch."""
 
 from __future__ import annotations
 
@@ -26,7 +26,9 @@ from d2lio.compare.shared.names import DEFAULT
 
 if TYPE_CHECKING:
     from d2lio.ablate.results import Results
+    from d2lio.compare.collect import Meta
     from d2lio.compare.material import Material
+    from d2lio.datasets.source import Source
 
 SEQ_HELP = "Sequence directory, bag, or the name of a scene to simulate."
 VARIANTS_HELP = (
@@ -73,6 +75,7 @@ def compare(
     from d2lio.compare.material import find_material
     from d2lio.compare.offline import CompareOptions
     from d2lio.compare.offline import compare as run
+    from d2lio.compare.recording import RECORDING_FILE
     from d2lio.compare.variants import parse
 
     with guard():
@@ -84,12 +87,50 @@ def compare(
             ablation = run(material, chosen, target, options, display)
         for label, reason in ablation.problems.items():
             complain(f"{label}: {reason}")
-        recording = _record(material, ablation.results, save or target / "compare.rrd")
+        recording = _record(material, ablation.results, save or target / RECORDING_FILE)
         _finish(ablation.results, recording, as_json)
         if recording is not None and save is None and not (no_viewer or as_json):
             _show(recording)
         if not any(row.scans_processed for row in ablation.results.rows):
             raise typer.Exit(EXIT_FAILED)
+
+
+def collect(
+    out: Annotated[Path, typer.Argument(help="Output directory of compare.launch.")],
+) -> None:
+    """Write results, report and recording out of what the nodes of compare.launch saved."""
+    from d2lio.compare import collect as work
+    from d2lio.compare import recording
+
+    with guard():
+        target = out.absolute()
+        results = work.collect(target)
+        file = None
+        if recording.missing() is None:
+            source = _source_of(work.read_meta(target))
+            file = recording.write(results, source, target / recording.RECORDING_FILE)
+        _finish(results, file, as_json=False)
+        if not any(row.scans_processed for row in results.rows):
+            complain("no variant gave a trajectory")
+            raise typer.Exit(EXIT_FAILED)
+
+
+def _source_of(meta: Meta) -> Source | None:
+    """The bag that was played; None, with a note, where it cannot be read here."""
+    from d2lio.datasets import open_source
+    from d2lio.errors import ConfigError, DataError
+    from d2lio.sequence import FILE_NAME
+
+    if not meta.bag:
+        return None
+    config = Path(meta.config) if meta.config else None
+    try:
+        if config is not None and config.name == FILE_NAME:
+            return open_source(config.parent)
+        return open_source(Path(meta.bag), config)
+    except (ConfigError, DataError) as err:
+        note(f"no clouds in the recording: {err}")
+        return None
 
 
 def _record(material: Material, results: Results, file: Path) -> Path | None:

@@ -16,6 +16,7 @@ PLOTS = {
 }
 TIMELINE = "time"
 GRID_COLUMNS = 2
+BACKGROUND = (16, 18, 22)
 
 
 def make(tracks: list[Track]) -> Any:
@@ -37,7 +38,7 @@ def make(tracks: list[Track]) -> Any:
         ),
         rrb.BlueprintPanel(state="collapsed"),
         rrb.SelectionPanel(state="collapsed"),
-        rrb.TimePanel(state="collapsed"),
+        rrb.TimePanel(state="collapsed", timeline=TIMELINE),
     )
 
 
@@ -51,6 +52,7 @@ def _view(rrb: Any, name: str, tracks: list[Track]) -> Any:
     return rrb.Spatial3DView(
         origin="/world",
         name=name,
+        background=BACKGROUND,
         contents=["/world/truth/**", "/world/map", *(f"/world/{track.id}/**" for track in tracks)],
         overrides={
             f"/world/{track.id}/path": rrb.archetypes.VisibleTimeRanges([so_far])

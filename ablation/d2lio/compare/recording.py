@@ -202,7 +202,7 @@ class _Writer:
     def _boards(self) -> None:
         replay = Replay(self._tracks, self._truth)
         states = int(np.clip((self._end - self._begin) / NS_PER_S, 1, BOARDS))
-        moments = np.linspace(self._begin, self._end, states + 1)[1:].astype(np.int64)
+        moments = np.linspace(self._begin, self._end, states + 1).astype(np.int64)
         texts = [board.markdown(replay.at(int(moment))) for moment in moments[:-1]]
         texts.append(final_text(replay, self._tracks))
         kinds = [self._rr.MediaType.MARKDOWN] * len(texts)

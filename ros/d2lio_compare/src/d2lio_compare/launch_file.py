@@ -1,0 +1,166 @@
+# SPDX-FileCopyrightText: 2026 D2-LIO contributors
+# SPDX-License-Identifier: BSD-3-Clause
+"""The launch file of the variants: roslaunch's XML has no loops, so it is written for each call."""
+
+from __future__ import annotations
+
+import json
+from typing import NamedTuple
+from xml.etree import ElementTree
+
+from d2lio_compare.shared.names import Variant
+
+NODE_NAME = "d2lio"
+SCOREBOARD = "scoreboard"
+PLAYER = "/player"
+NODES = "nodes"  # below the output directory: what the nodes save, one directory each
+PACKAGES = {"fastlio": "d2lio_fastlio", "liosam": "d2lio_liosam", "d2lio": "d2lio_liosam"}
+
+
+class Setting(NamedTuple):
+    """What all variants have in common.
+
+    Attributes:
+        out: output directory, absolute.
+        config: data description of the recording, empty for none.
+        truth_file, truth_topic: at most one is not empty.
+        sim_time: whether a bag's clock is used.
+    """
+
+    out: str
+    config: str
+    truth_file: str
+    truth_topic: str
+    lidar_topic: str
+    imu_topic: str
+    lidar_type: str
+    threads: int
+    queue_scans: int
+    sim_time: bool
+    rviz_config: str
+
+
+def write(variants: list[Variant], setting: Setting) -> str:
+    """The launch file as text."""
+    root = ElementTree.Element("launch")
+    if setting.sim_time:
+        _param(root, "/use_sim_time", "true", "bool")
+    for variant in variants:
+        group = ElementTree.SubElement(root, "group", ns=variant.id)
+        if variant.upstream:
+            _UPSTREAM[variant.upstream](group, setting)
+        else:
+            _own_node(group, variant, setting)
+    _scoreboard(root, variants, setting)
+    if setting.rviz_config:
+        args = f"-d '{setting.rviz_config}'"
+        ElementTree.SubElement(root, "node", pkg="rviz", type="rviz", name="rviz", args=args)
+    _indent(root)
+    return '<?xml version="1.0"?>\n' + ElementTree.tostring(root, encoding="unicode") + "\n"
+
+
+def _param(parent: ElementTree.Element, name: str, value: object, kind: str = "str") -> None:
+    attributes = {"name": name, "value": str(value), "type": kind}
+    ElementTree.SubElement(parent, "param", attributes)
+
+
+def _own_node(group: ElementTree.Element, variant: Variant, setting: Setting) -> None:
+    package = PACKAGES[variant.host]
+    node = ElementTree.SubElement(
+        group, "node", pkg=package, type=package, name=NODE_NAME, output="screen"
+    )
+    if package == "d2lio_liosam":
+        _param(node, "estimator", variant.host)
+    for key, value in _topics(setting):
+        _param(node, key, value)
+    if setting.config:
+        _param(node, "sequence_config", setting.config)
+    _param(node, "map_frame", "map")
+    _param(node, "body_frame", f"{variant.id}/imu")
+    _param(node, "queue_scans", setting.queue_scans, "int")
+    _param(node, "threads", setting.threads, "int")
+    _param(node, "save_dir", f"{setting.out}/{NODES}")
+    _param(node, "results_name", variant.id)
+    _param(node, "rejection/mode", variant.rejection)
+    _param(node, "degeneracy/method", variant.degeneracy)
+
+
+def _topics(setting: Setting) -> list[tuple[str, str]]:
+    pairs = [
+        ("lidar_topic", setting.lidar_topic),
+        ("imu_topic", setting.imu_topic),
+        ("lidar_type", setting.lidar_type),
+    ]
+    return [(key, value) for key, value in pairs if value]
+
+
+def _fast_lio(group: ElementTree.Element, setting: Setting) -> None:
+    """Upstream FAST_LIO: its own launch file and configuration, its topics in our namespace."""
+    for theirs in ("Odometry", "path", "cloud_registered", "cloud_registered_body", "Laser_map"):
+        ours = "odometry" if theirs == "Odometry" else theirs
+        ElementTree.SubElement(group, "remap", {"from": f"/{theirs}", "to": ours})
+    include = ElementTree.SubElement(
+        group, "include", file="$(find fast_lio)/launch/mapping_velodyne.launch"
+    )
+    ElementTree.SubElement(include, "arg", name="rviz", value="false")
+    for key, value in (("lid_topic", setting.lidar_topic), ("imu_topic", setting.imu_topic)):
+        if value:
+            _param(group, f"common/{key}", value)
+    _frame(group, "camera_init")
+
+
+def _lio_sam(group: ElementTree.Element, setting: Setting) -> None:
+    """Upstream LIO-SAM without its own RViz; its odometry is that of the LiDAR."""
+    ElementTree.SubElement(
+        group, "rosparam", file="$(find lio_sam)/config/params.yaml", command="load"
+    )
+    pairs = (("pointCloudTopic", setting.lidar_topic), ("imuTopic", setting.imu_topic))
+    for key, value in pairs:
+        if value:
+            _param(group, f"lio_sam/{key}", value)
+    ElementTree.SubElement(group, "remap", {"from": "lio_sam/mapping/odometry", "to": "odometry"})
+    ElementTree.SubElement(group, "remap", {"from": "lio_sam/mapping/path", "to": "path"})
+    cloud = {"from": "lio_sam/mapping/cloud_registered", "to": "cloud_registered"}
+    ElementTree.SubElement(group, "remap", cloud)
+    ElementTree.SubElement(
+        group, "include", file="$(find lio_sam)/launch/include/module_loam.launch"
+    )
+
+
+_UPSTREAM = {"fast_lio": _fast_lio, "lio_sam": _lio_sam}
+
+
+def _frame(group: ElementTree.Element, frame: str) -> None:
+    """Their map frame beside ours: both begin where the sensor does."""
+    ElementTree.SubElement(
+        group,
+        "node",
+        pkg="tf2_ros",
+        type="static_transform_publisher",
+        name=f"{frame}_in_map",
+        args=f"0 0 0 0 0 0 map {frame}",
+    )
+
+
+def _scoreboard(root: ElementTree.Element, variants: list[Variant], setting: Setting) -> None:
+    node = ElementTree.SubElement(
+        root, "node", pkg="d2lio_compare", type="scoreboard.py", name=SCOREBOARD, output="screen"
+    )
+    _param(node, "out", setting.out)
+    _param(node, "truth_file", setting.truth_file)
+    _param(node, "truth_topic", setting.truth_topic)
+    _param(node, "config", setting.config)
+    text = ElementTree.SubElement(node, "rosparam", param="variants")
+    text.text = json.dumps([dict(variant._asdict()) for variant in variants])
+
+
+def _indent(element: ElementTree.Element, level: int = 0) -> None:
+    """ElementTree.indent, which Python 3.8 lacks."""
+    pad = "\n" + "  " * level
+    if len(element):
+        if not (element.text or "").strip():
+            element.text = pad + "  "
+        for child in element:
+            _indent(child, level + 1)
+            child.tail = pad + "  "
+        element[-1].tail = pad
