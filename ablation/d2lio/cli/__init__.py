@@ -35,6 +35,10 @@ app.command("demo")(commands_demo.demo)
 app.command("ablate")(commands_ablate.ablate)
 app.command("compare")(commands_compare.compare)
 app.command("compare-collect", hidden=True)(commands_compare.collect)
+launch = typer.Typer(name="launch", help="Comparisons out of ROS nodes.", no_args_is_help=True)
+launch.callback()(lambda: None)  # a command of its own even while there is but one
+launch.command("compare")(commands_compare.launch)
+app.add_typer(launch)
 app.add_typer(commands_datasets.app)
 app.add_typer(commands_peers.app)
 

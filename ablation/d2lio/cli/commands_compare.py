@@ -35,6 +35,8 @@ VARIANTS_HELP = (
     "With commas: off, none, fixed, kiss, point_adaptive, d2; HOST:NAME for another host."
 )
 
+UPSTREAM_HELP = "upstream:fast_lio, upstream:lio_sam: those of the ROS workspace."
+
 
 def compare(
     seq: Annotated[str, typer.Argument(metavar="SEQ", help=SEQ_HELP)],
@@ -113,6 +115,48 @@ def collect(
         if not any(row.scans_processed for row in results.rows):
             complain("no variant gave a trajectory")
             raise typer.Exit(EXIT_FAILED)
+
+
+def launch(
+    seq: Annotated[str, typer.Argument(metavar="SEQ", help=SEQ_HELP)],
+    variants: Annotated[str, typer.Option(help=f"{VARIANTS_HELP} {UPSTREAM_HELP}")] = DEFAULT,
+    host: Annotated[str, typer.Option(help="Of names without a host: fastlio, liosam, d2lio.")] = (
+        "fastlio"
+    ),
+    out: Annotated[
+        Path | None, typer.Option(help="Directory for everything; default results/launch_SEQ.")
+    ] = None,
+    truth: Annotated[Path | None, typer.Option(help="Ground truth, TUM: T_world_imu.")] = None,
+    config: Annotated[
+        Path | None, typer.Option(help="Of a bag: extrinsic, topics; see `d2lio run --help`.")
+    ] = None,
+    duration: Annotated[
+        float | None, typer.Option(min=1.0, help="Of a scene to simulate, s.")
+    ] = None,
+    rate: Annotated[float, typer.Option(min=0.01, help="Times as fast as recorded.")] = 1.0,
+    threads: Annotated[int, typer.Option(min=1, help="Threads of each estimator.")] = 1,
+    headless: Annotated[
+        bool, typer.Option("--headless", help="No RViz; ends with the bag.")
+    ] = False,
+) -> None:
+    """Run the variants as ROS nodes on a bag, with RViz and a running scoreboard.
+
+    Writes the same results and report as `d2lio compare`. Needs ROS 1 in the environment;
+    `./d2lio launch` sets it up. Exit code 4: no variant gave a trajectory.
+    """
+    from d2lio.compare.launch import LaunchOptions
+    from d2lio.compare.launch import launch as run
+    from d2lio.compare.material import find_material
+    from d2lio.compare.variants import parse
+
+    with guard():
+        parse(variants, host, upstream=True)
+        target = (out or Path("results") / f"launch_{Path(seq).stem}").absolute()
+        material = find_material(seq, target, config=config, truth=truth, duration=duration)
+        options = LaunchOptions(variants, host, rate, threads, headless)
+        code = run(material, target, options)
+        if code:
+            raise typer.Exit(code)
 
 
 def _source_of(meta: Meta) -> Source | None:

@@ -110,4 +110,4 @@ class Feed:
 
 def _created(folder: str, name: str) -> Any:
     """A text file that stays open as long as the node runs."""
-    return open(os.path.join(folder, name), "w", encoding="utf-8", newline="")  # noqa: SIM115
+    return open(os.path.join(folder, name), "w", encoding="utf-8", newline="")

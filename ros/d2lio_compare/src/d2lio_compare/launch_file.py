@@ -106,7 +106,6 @@ def _fast_lio(group: ElementTree.Element, setting: Setting) -> None:
     for key, value in (("lid_topic", setting.lidar_topic), ("imu_topic", setting.imu_topic)):
         if value:
             _param(group, f"common/{key}", value)
-    _frame(group, "camera_init")
 
 
 def _lio_sam(group: ElementTree.Element, setting: Setting) -> None:
@@ -128,18 +127,6 @@ def _lio_sam(group: ElementTree.Element, setting: Setting) -> None:
 
 
 _UPSTREAM = {"fast_lio": _fast_lio, "lio_sam": _lio_sam}
-
-
-def _frame(group: ElementTree.Element, frame: str) -> None:
-    """Their map frame beside ours: both begin where the sensor does."""
-    ElementTree.SubElement(
-        group,
-        "node",
-        pkg="tf2_ros",
-        type="static_transform_publisher",
-        name=f"{frame}_in_map",
-        args=f"0 0 0 0 0 0 map {frame}",
-    )
 
 
 def _scoreboard(root: ElementTree.Element, variants: list[Variant], setting: Setting) -> None:

@@ -19,7 +19,7 @@ import numpy as np
 import rospy
 import yaml
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
-from geometry_msgs.msg import PoseStamped
+from geometry_msgs.msg import PoseStamped, TransformStamped
 from nav_msgs.msg import Odometry, Path
 from roslib.message import get_message_class
 from std_msgs.msg import Float64, String
@@ -73,6 +73,8 @@ class Scoreboard:
         self._drained = False
         self._advertise()
         self._subscribe()
+        if any(variant.upstream == "fast_lio" for variant in variants):
+            self._frames = _same_frame("map", "camera_init")
 
     def _read_truth(self) -> Truth:
         file = rospy.get_param("~truth_file", "")
@@ -267,6 +269,21 @@ def _label(number: int, variant: Variant, line: Line, position: np.ndarray) -> M
     marker.color.a = 1.0
     marker.text = line.title if line.ape is None else f"{line.title}  {line.ape:.3f} m"
     return marker
+
+
+def _same_frame(ours: str, theirs: str) -> Any:
+    """Publishes that FAST_LIO's map frame is ours: both begin where the sensor does."""
+    try:
+        from tf2_msgs.msg import TFMessage
+    except ImportError:
+        rospy.logwarn("no tf2_msgs: what is in %s is not drawn in %s", theirs, ours)
+        return None
+    publisher = rospy.Publisher("/tf_static", TFMessage, queue_size=1, latch=True)
+    transform = TransformStamped(child_frame_id=theirs)
+    transform.header.frame_id = ours
+    transform.transform.rotation.w = 1.0
+    publisher.publish(TFMessage([transform]))
+    return publisher
 
 
 def main() -> None:
