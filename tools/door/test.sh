@@ -34,13 +34,19 @@ run_pytest() { # REPORTS ARGUMENTS...
 
 cmd_test() {
     local cpp=1 python=1 preset=release
+    if [[ ${1:-} == --ros ]]; then
+        shift
+        [[ ${1:-} == -- ]] && shift
+        test_ros "$@"
+        return
+    fi
     while (($#)); do
         case $1 in
             --cpp) python=0 ;;
             --python) cpp=0 ;;
             --sanitize) preset=sanitize python=0 ;;
             --) shift && break ;;
-            *) die "$E_USAGE" "test: unknown option '$1' (--cpp, --python, --sanitize, -- PYTEST ARGUMENTS)" ;;
+            *) die "$E_USAGE" "test: unknown option '$1' (--cpp, --python, --sanitize, --ros, -- PYTEST ARGUMENTS)" ;;
         esac
         shift
     done
