@@ -10,10 +10,11 @@ from d2lio.compare.tracks import Track
 
 PLOTS = {
     "error": "Distance to the truth, m",
-    "lambda": "log10 of the smallest eigenvalue, translation",
+    "lambda": "Smallest eigenvalue of the translation, log10",
     "rejected": "Rejected correspondences, %",
     "time": "Time per scan, ms",
 }
+WITH_LEGEND = "error"
 TIMELINE = "time"
 GRID_COLUMNS = 2
 BACKGROUND = (16, 18, 22)
@@ -25,7 +26,14 @@ def make(tracks: list[Track]) -> Any:
 
     together = _view(rrb, "All variants", tracks)
     apart = [_view(rrb, track.title, [track]) for track in tracks]
-    plots = [rrb.TimeSeriesView(origin=f"/plots/{key}", name=name) for key, name in PLOTS.items()]
+    plots = [
+        rrb.TimeSeriesView(
+            origin=f"/plots/{key}",
+            name=name,
+            plot_legend=rrb.PlotLegend(visible=key == WITH_LEGEND),  # it covers curves
+        )
+        for key, name in PLOTS.items()
+    ]
     left = rrb.Tabs(
         together, rrb.Grid(*apart, grid_columns=GRID_COLUMNS, name="Side by side"), active_tab=0
     )

@@ -38,6 +38,8 @@ RECORDING_FILE = "compare.rrd"
 BOARDS = 300  # states of the scoreboard over a sequence, at most one per second
 PATH_RADIUS = -1.5  # negative: in pixels of the screen
 CLOUD_RADIUS = -1.0
+BODY_RADIUS = -5.0
+ARROW_RADIUS = -2.5
 MAP_COLOUR = (110, 110, 110)
 ARROW_SHARE = 0.04  # of the extent of all paths
 MIN_ARROW_M = 0.5
@@ -152,9 +154,7 @@ class _Writer:
         self._send(
             f"{entity}/path", track.poses.stamps[1:], rr.LineStrips3D.columns(strips=list(steps))
         )
-        here = rr.Points3D.from_fields(
-            colors=[rgb(track.colour)], radii=[-5.0], labels=[track.title]
-        )
+        here = rr.Points3D.from_fields(colors=[rgb(track.colour)], radii=[BODY_RADIUS])
         self._stream.log(f"{entity}/body", here, static=True)
         self._send(f"{entity}/body", track.poses.stamps, rr.Points3D.columns(positions=places))
 
@@ -175,7 +175,7 @@ class _Writer:
             origins += [places[stamp]] * counts[-1]
         if not vectors:
             return
-        look = rr.Arrows3D.from_fields(colors=[rgb(track.colour)], radii=[-2.5])
+        look = rr.Arrows3D.from_fields(colors=[rgb(track.colour)], radii=[ARROW_RADIUS])
         self._stream.log(entity, look, static=True)
         columns = rr.Arrows3D.columns(vectors=vectors, origins=origins)
         self._send(entity, stamps, columns.partition(counts))
