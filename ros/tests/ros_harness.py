@@ -78,7 +78,7 @@ class Ros:
         self.wait_for("master.log", "started core service")
 
     def node(self, package: str, name: str, **params: object) -> subprocess.Popen[bytes]:
-        """Starts a node `/NAME/odometry_node`; its topics are below /NAME. Dots of keys are `__`."""
+        """Starts `/NAME/odometry_node`; its topics are below /NAME. Dots of keys are `__`."""
         texts = [f"_{key.replace('__', '/')}:='{value}'" for key, value in params.items()]
         node = self.spawn(
             f"rosrun {package} {package} __name:=odometry_node {' '.join(texts)}",

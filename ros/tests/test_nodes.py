@@ -186,10 +186,10 @@ def test_every_wrong_parameter_is_told_at_once(ros, simulated):
     log = ros.text("wrong.log")
     for needle in (
         "~filter_size_surf = -1",
-        "~rejection/mod = kiss: unknown key; did you mean rejection.mode",
+        "~rejection/mod = kiss: unknown key; did you mean ~rejection/mode",
         "~rejection/mode = kis: allowed: ",
         "~threads = 0: allowed: ",
-        "~quee_scans = 3: unknown key; did you mean queue_scans",
+        "~quee_scans = 3: unknown key; did you mean ~queue_scans",
         "~mapping/extrinsic_R",
         "determinant",
     ):
@@ -199,7 +199,8 @@ def test_every_wrong_parameter_is_told_at_once(ros, simulated):
 
 def test_missing_topics_and_files_are_told(ros, tmp_path: Path):
     process = ros.spawn(
-        f"rosrun d2lio_fastlio d2lio_fastlio __name:=missing _sequence_config:={tmp_path}/none.yaml",
+        "rosrun d2lio_fastlio d2lio_fastlio __name:=missing"
+        f" _sequence_config:={tmp_path}/none.yaml",
         "missing.log",
     )
     assert process.wait(20) == 1

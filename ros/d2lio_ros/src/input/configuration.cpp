@@ -82,7 +82,10 @@ void refuse_unknown(Settings& settings, const EstimatorKind& kind, const std::st
             continue;
         }
         const std::string name = where.empty() ? as_path(it->first) : where + it->first;
-        problems.add(name, it->second.text, "unknown key; " + nearest(it->first, known));
+        const std::string near = nearest(it->first, known);
+        const std::string hint = where.empty() && !near.empty() ? as_path(near) : near;
+        problems.add(name, it->second.text,
+                     "unknown key" + (hint.empty() ? "" : "; did you mean " + hint + "?"));
         it = settings.erase(it);
     }
 }

@@ -9,6 +9,7 @@ namespace d2lio::ros1 {
 namespace {
 
 constexpr double kSilence = 1.0;  // s without a message
+constexpr double kAtStart = 5.0;  // s until the first one
 constexpr double kApart = 10.0;   // s; no driver delays one stream against the other by this much
 
 double seconds(std::chrono::steady_clock::duration d) {
@@ -32,7 +33,7 @@ void InputWatch::Stream::see(Stamp stamp, Clock::time_point arrival) {
 
 std::string InputWatch::Stream::silence(Clock::time_point now, Clock::time_point since) const {
     const double age = seconds(now - last_arrival.value_or(since));
-    if (age <= kSilence) return {};
+    if (age <= (last_arrival ? kSilence : kAtStart)) return {};
     char text[32];
     std::snprintf(text, sizeof text, "%.1f s", age);
     return "no message on " + topic + " for " + text;

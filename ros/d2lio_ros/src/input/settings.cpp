@@ -87,7 +87,7 @@ std::string nearest(const std::string& key, const std::set<std::string>& known) 
             best = name;
         }
     }
-    return best.empty() ? "" : "did you mean " + best + "?";
+    return best;
 }
 
 Settings settings_from_yaml(const std::string& path, Problems& problems) {

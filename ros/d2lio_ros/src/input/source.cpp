@@ -135,7 +135,9 @@ void read_source_file(const std::string& path, const std::string& host, Source& 
     source.bind(table);
     for (const ParamInfo& info : table.describe()) known.insert(info.key);
     for (const auto& [key, value] : settings) {
-        problems.add(path + ": " + key, value.text, "unknown key; " + nearest(key, known));
+        const std::string near = nearest(key, known);
+        problems.add(path + ": " + key, value.text,
+                     "unknown key" + (near.empty() ? "" : "; did you mean " + near + "?"));
     }
     source.complete(is_sequence);
 }

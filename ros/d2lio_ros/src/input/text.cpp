@@ -16,7 +16,8 @@ constexpr int kFixedFrom = -4, kFixedTo = 16;  // exponents that Python writes w
 /// d.ddd...e+xx with the fewest digits that read back.
 std::string scientific(double value) {
     char text[40];
-    for (int digits = kLeastExact; digits <= kMostNeeded; ++digits) {
+    const bool tiny = std::fpclassify(value) == FP_SUBNORMAL;  // fewer digits are exact
+    for (int digits = tiny ? 1 : kLeastExact; digits <= kMostNeeded; ++digits) {
         std::snprintf(text, sizeof text, "%.*e", digits - 1, value);
         if (std::strtod(text, nullptr) == value) break;
     }

@@ -134,14 +134,15 @@ void Node::on_result(const ScanResult& result, const ResultContext& context) {
 
 void Node::on_timer() {
     const InputQueue::Counts q = worker_.queue().counts();
-    if (q.scans_dropped > dropped_) {
-        complaints_.tell("queue_full",
-                         "the estimator cannot keep up: " + std::to_string(q.scans_dropped) +
-                             " scans dropped so far (queue_scans, threads, point_filter_num)");
-    }
-    dropped_ = q.scans_dropped;
     const std::string silent = watch_.complaint(Clock::now());
     if (!silent.empty()) complaints_.tell("silent", silent);
+    if (q.scans_dropped > dropped_) {
+        const std::string why = silent.empty() ? "the estimator cannot keep up" : "no estimate";
+        complaints_.tell("queue_full", why + ": " + std::to_string(q.scans_dropped) +
+                                           " scans dropped so far (queue_scans " +
+                                           std::to_string(config_.node.queue_scans) + ")");
+    }
+    dropped_ = q.scans_dropped;
     std::string message;
     for (const std::string& text : complaints_.recent(kRecent)) {
         message += (message.empty() ? "" : "; ") + text;

@@ -37,7 +37,7 @@ class Problems {
     std::vector<std::string> lines_;
 };
 
-/// The known key nearest to a mistyped one, as "did you mean ...?"; empty if none is near.
+/// The known key nearest to a mistyped one; empty if none is near.
 std::string nearest(const std::string& key, const std::set<std::string>& known);
 
 /// A YAML file's nested mappings as dotted keys; what cannot be read is added to the problems.
