@@ -83,7 +83,8 @@ def launch(material: Material, out: Path, options: LaunchOptions) -> int:
         _wait_for_master(core, port)
         shown = "false" if options.headless else "true"
         command = [
-            "roslaunch", "--disable-title", "--skip-log-check", f"--sigint-timeout={STOP_S:g}",
+            "roslaunch", "--no-summary", "--disable-title", "--skip-log-check",
+            f"--sigint-timeout={STOP_S:g}",
             "d2lio_fastlio", "compare.launch", f"bag:={bag}", f"variants:={options.variants}",
             f"host:={options.host}", f"out:={out}", f"rate:={options.rate:g}", f"rviz:={shown}",
             f"threads:={options.threads}", *arguments,

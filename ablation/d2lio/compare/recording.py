@@ -74,7 +74,8 @@ def write(results: Results, source: Source | None, file: Path) -> Path:
     except OSError as err:
         raise DataError(f"{file}: cannot be written: {err.strerror}") from None
     try:
-        stream = rr.RecordingStream(APPLICATION)
+        # The viewer remembers an arrangement by this name; it fits the same variants only.
+        stream = rr.RecordingStream("_".join([APPLICATION, *(track.id for track in tracks)]))
         stream.save(folder / file.name, default_blueprint=blueprint.make(tracks))
         _Writer(rr, stream, tracks, truth).write(results, source)
         stream.disconnect()

@@ -37,7 +37,6 @@ class Setting(NamedTuple):
     threads: int
     queue_scans: int
     sim_time: bool
-    rviz_config: str
 
 
 def write(variants: list[Variant], setting: Setting) -> str:
@@ -52,9 +51,6 @@ def write(variants: list[Variant], setting: Setting) -> str:
         else:
             _own_node(group, variant, setting)
     _scoreboard(root, variants, setting)
-    if setting.rviz_config:
-        args = f"-d '{setting.rviz_config}'"
-        ElementTree.SubElement(root, "node", pkg="rviz", type="rviz", name="rviz", args=args)
     _indent(root)
     return '<?xml version="1.0"?>\n' + ElementTree.tostring(root, encoding="unicode") + "\n"
 

@@ -31,7 +31,8 @@ META_FILE = "compare.json"
 LAUNCH_FILE, RVIZ_FILE = "variants.launch", "compare.rviz"
 START_UP_S = 30.0
 DRAIN_S = 1800.0
-STOP_S = 40.0  # for nodes to save; roslaunch gives each of them 30
+NODE_STOP_S = 30.0  # for a node to save; they do it at the same time
+STOP_S = 40.0
 TICK_S = 0.2
 QUEUE = 2000  # messages a subscriber may be behind before the player drops some
 SEQUENCE_FILE = "sequence.yaml"
@@ -99,6 +100,7 @@ class Comparison:
         self._stop: int | None = None
         self._roslaunch: subprocess.Popen[bytes] | None = None
         self._player: subprocess.Popen[bytes] | None = None
+        self._rviz: subprocess.Popen[bytes] | None = None
 
     def run(self) -> int:
         """Does it all."""
@@ -107,13 +109,16 @@ class Comparison:
             signal.signal(number, self._on_signal)
         try:
             self._start()
+            if self._options.rviz and self._going():
+                self._show()
             if self._bag:
                 self._play()
             self._wait()
         finally:
             self._end()
-        code = self._collect()
-        return EXIT_INTERRUPTED if self._stop == signal.SIGTERM else code
+            code = self._collect()
+            self._hold()
+        return code if self._stop is None else EXIT_INTERRUPTED
 
     def _on_signal(self, number: int, _: Any) -> None:
         self._stop = number
@@ -129,7 +134,6 @@ class Comparison:
         for name in ("scoreboard.json", "truth.tum"):
             if os.path.exists(os.path.join(self._out, name)):
                 os.remove(os.path.join(self._out, name))
-        rviz_config = os.path.join(self._out, RVIZ_FILE)
         setting = Setting(
             out=self._out,
             config=self._config,
@@ -141,7 +145,6 @@ class Comparison:
             threads=options.threads,
             queue_scans=options.queue_scans,
             sim_time=bool(self._bag),
-            rviz_config=rviz_config if options.rviz else "",
         )
         meta = {
             "sequence": self._name,
@@ -160,7 +163,8 @@ class Comparison:
 
     def _start(self) -> None:
         say(f"variants: {', '.join(variant.title for variant in self._variants)}")
-        command = ["roslaunch", "--skip-log-check", "--disable-title", "--sigint-timeout=30"]
+        command = ["roslaunch", "--no-summary", "--skip-log-check", "--disable-title"]
+        command.append(f"--sigint-timeout={NODE_STOP_S:g}")
         self._roslaunch = subprocess.Popen(
             [*command, os.path.join(self._out, LAUNCH_FILE)],
             start_new_session=True,  # Ctrl-C reaches it through us, once
@@ -170,6 +174,16 @@ class Comparison:
         late = [name for name in own if not graph.listening([name])]
         if late and self._going():
             say(f"not up after {START_UP_S:g} s: {', '.join(late)}")
+
+    def _show(self) -> None:
+        """Opens RViz; it outlives the variants, and they outlive it."""
+        if shutil.which("rviz") is None:
+            say("no rviz on PATH; going on without")
+            return
+        command = ["rviz", "-d", os.path.join(self._out, RVIZ_FILE), "__name:=compare_rviz"]
+        self._rviz = subprocess.Popen(
+            command, stdin=subprocess.DEVNULL, stderr=subprocess.DEVNULL, start_new_session=True
+        )
 
     def _play(self) -> None:
         if not self._going():
@@ -182,7 +196,12 @@ class Comparison:
             more = [options.truth_topic] if options.truth_topic else []
             command[-1:-1] = ["--topics", *topics, *more, "--bags", self._bag]
             command.remove(self._bag)
-        self._player = subprocess.Popen(command, stdin=subprocess.DEVNULL, start_new_session=True)
+        self._player = subprocess.Popen(
+            command,
+            stdin=subprocess.DEVNULL,
+            stdout=subprocess.DEVNULL,  # keys to press, which reach nobody
+            start_new_session=True,
+        )
         self._until(lambda: graph.connected(PLAYER, topics), START_UP_S)
         if not self._going():
             return
@@ -199,7 +218,7 @@ class Comparison:
                 graph.set_param("/scoreboard/bag_done", True)
                 say("the bag is done; waiting for the variants")
                 self._until(lambda: graph.get_param("/scoreboard/drained"), DRAIN_S)
-        if self._player is None or self._options.hold:
+        else:
             say("Ctrl-C ends it and writes results and report")
             self._until(lambda: False, float("inf"))
 
@@ -222,6 +241,17 @@ class Comparison:
             if process is not None:
                 _stop(process, patience_s)
 
+    def _hold(self) -> None:
+        """Leaves RViz open until it is closed, or somebody ends us."""
+        if self._rviz is None:
+            return
+        if self._options.hold and self._stop is None and self._rviz.poll() is None:
+            say("done; close RViz or press Ctrl-C")
+            while self._stop is None and self._rviz.poll() is None:
+                time.sleep(TICK_S)
+            self._stop = None  # everything was done already
+        _stop(self._rviz, 5.0)
+
     def _collect(self) -> int:
         """Results and report by the same code as `d2lio ablate`; it goes on if we are killed."""
         program = _program()
@@ -231,8 +261,6 @@ class Comparison:
                 f"not found: install it and run `d2lio compare-collect {self._out}`"
             )
             return 0
-        for number in (signal.SIGINT, signal.SIGTERM):
-            signal.signal(number, signal.SIG_IGN)  # the last seconds are for the report
         return subprocess.call(
             [*program, "compare-collect", self._out],
             stdin=subprocess.DEVNULL,

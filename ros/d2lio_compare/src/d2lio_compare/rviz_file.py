@@ -13,6 +13,7 @@ from d2lio_compare.shared.names import TRUTH_COLOUR, Variant, rgb
 WIDTH, HEIGHT = 1600, 900
 TRUTH_TOPIC = "/truth/path"
 LABELS_TOPIC = "/scoreboard/labels"
+MARKERS_TOPIC = "compare_markers"  # of each variant, in its colour
 
 
 def write(variants: list[Variant]) -> str:
@@ -22,7 +23,7 @@ def write(variants: list[Variant]) -> str:
          "Plane Cell Count": 40},
         _path("Ground truth", TRUTH_TOPIC, TRUTH_COLOUR, 0.06),
         _markers("Scoreboard", LABELS_TOPIC, True),
-        *(_group(variant, number == 0) for number, variant in enumerate(variants)),
+        *(_group(variant) for variant in variants),
     ]  # fmt: skip
     layout = {
         "Panels": [{"Class": "rviz/Displays", "Name": "Displays"}],
@@ -36,7 +37,7 @@ def write(variants: list[Variant]) -> str:
             "Name": "root",
             "Tools": [{"Class": "rviz/MoveCamera"}, {"Class": "rviz/Measure"}],
             "Value": True,
-            "Views": {"Current": _camera()},
+            "Views": {"Current": _camera(variants[0])},
         },
         "Window Geometry": {
             "Displays": {"collapsed": False}, "Width": WIDTH, "Height": HEIGHT, "X": 0, "Y": 0,
@@ -49,21 +50,23 @@ def _colour(text: str) -> str:
     return "; ".join(str(part) for part in rgb(text))
 
 
-def _camera() -> dict[str, Any]:
+def _camera(variant: Variant) -> dict[str, Any]:
+    """It goes along with a variant; an upstream node's frame is not known."""
+    frame = "map" if variant.upstream else f"{variant.id}/imu"
     return {
         "Class": "rviz/Orbit",
         "Name": "Current View",
         "Distance": 30,
         "Pitch": 0.9,
         "Yaw": 3.9,
-        "Target Frame": "map",
+        "Target Frame": frame,
         "Value": "Orbit (rviz)",
         "Focal Point": {"X": 0, "Y": 0, "Z": 0},
     }
 
 
-def _group(variant: Variant, first: bool) -> dict[str, Any]:
-    """Displays of one variant; the clouds of all but the first are off, they hide each other."""
+def _group(variant: Variant) -> dict[str, Any]:
+    """Displays of one variant."""
     ns = f"/{variant.id}"
     return {
         "Class": "rviz/Group",
@@ -71,8 +74,8 @@ def _group(variant: Variant, first: bool) -> dict[str, Any]:
         "Enabled": True,
         "Displays": [
             _path("Path", f"{ns}/path", variant.colour, 0.05),
-            _cloud("Registered cloud", f"{ns}/cloud_registered", variant.colour, first),
-            _markers("Weak directions", f"{ns}/markers", True),
+            _cloud("Registered cloud", f"{ns}/cloud_registered", variant.colour, True),
+            _markers("Weak directions", f"{ns}/{MARKERS_TOPIC}", True),
             _cloud("Rejected points", f"{ns}/rejected", "", False),
         ],
     }
@@ -104,6 +107,7 @@ def _cloud(name: str, topic: str, colour: str, enabled: bool) -> dict[str, Any]:
         "Color Transformer": "FlatColor" if colour else "RGB8",
         "Style": "Points",
         "Size (Pixels)": 2,
+        "Alpha": 0.6,
         "Decay Time": 0,
         "Queue Size": 5,
     }

@@ -38,7 +38,7 @@ from d2lio_compare.poses import (
     start_in_map,
     tum_line,
 )
-from d2lio_compare.rviz_file import LABELS_TOPIC, TRUTH_TOPIC
+from d2lio_compare.rviz_file import LABELS_TOPIC, MARKERS_TOPIC, TRUTH_TOPIC
 from d2lio_compare.shared.board import HEADERS, Line, cells, plain
 from d2lio_compare.shared.names import Variant, rgb
 
@@ -47,7 +47,7 @@ QUIET_S = 2.0  # a bag that is done is drained when no variant said anything for
 STATE_FILE = "scoreboard.json"
 TRUTH_FILE = "truth.tum"  # of a topic, as heard
 PATH_POSES = 2000
-LABEL_M = 0.5
+LABEL_M = 0.8
 LEVELS = {"DEGENERATE": DiagnosticStatus.WARN, "LOST": DiagnosticStatus.ERROR}
 
 
@@ -110,6 +110,9 @@ class Scoreboard:
             rospy.Subscriber(f"{ns}/odometry", Odometry, self._on_odometry, feed, tcp_nodelay=True)
             topic = f"{ns}/d2lio/diagnostics" if feed.variant.upstream else f"{ns}/diagnostics"
             rospy.Subscriber(topic, DiagnosticArray, self._on_diagnostics, feed)
+            coloured = rospy.Publisher(f"{ns}/{MARKERS_TOPIC}", MarkerArray, queue_size=2)
+            passed = (feed.variant, coloured)
+            rospy.Subscriber(f"{ns}/markers", MarkerArray, _on_markers, passed, queue_size=2)
         topic = rospy.get_param("~truth_topic", "")
         if topic:
             rospy.Subscriber(topic, rospy.AnyMsg, self._on_truth)
@@ -220,6 +223,18 @@ class Scoreboard:
             "epochs": {f.variant.id: f.epochs for f in self._feeds},
         }
         _replace(os.path.join(self._out, STATE_FILE), json.dumps(state, indent=2) + "\n")
+
+
+def _on_markers(message: MarkerArray, passed: tuple[Variant, rospy.Publisher]) -> None:
+    """Hands a variant's markers on in its colour; texts are left to the labels."""
+    variant, publisher = passed
+    red, green, blue = (part / 255.0 for part in rgb(variant.colour))
+    kept = MarkerArray()
+    for marker in message.markers:
+        if marker.type != Marker.TEXT_VIEW_FACING:
+            marker.color.r, marker.color.g, marker.color.b = red, green, blue
+            kept.markers.append(marker)
+    publisher.publish(kept)
 
 
 def _replace(file: str, text: str) -> None:
