@@ -2,6 +2,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "d2lio/ros1/text.hpp"
 
+#include <algorithm>
 #include <cmath>
 #include <cstdio>
 #include <cstdlib>
@@ -32,8 +33,8 @@ std::string shortest(double value) {
     const std::string text = scientific(value);
     const std::string sign = text[0] == '-' ? "-" : "";
     const std::size_t e = text.find('e');
-    std::string digits =
-        text.substr(sign.size(), 1) + text.substr(sign.size() + 2, e - sign.size() - 2);
+    std::string digits = text.substr(sign.size(), e - sign.size());
+    digits.erase(std::remove(digits.begin(), digits.end(), '.'), digits.end());
     digits.erase(digits.find_last_not_of('0') + 1);
     if (digits.empty()) return sign + "0.0";
     const int exponent = std::atoi(text.c_str() + e + 1);
