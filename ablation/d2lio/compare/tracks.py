@@ -132,7 +132,8 @@ class Replay:
         for index, track in enumerate(self._tracks):
             self._advance(index, stamp)
             ape = self._apes[index].rmse(until=stamp) if len(self._apes[index]) else None
-            lines.append(self._counts[index].line(track.title, "", ape))
+            poses = int(np.searchsorted(track.poses.stamps, stamp, side="right"))
+            lines.append(self._counts[index].line(track.title, "", ape, poses))
         return lines
 
     def end(self) -> list[Line]:

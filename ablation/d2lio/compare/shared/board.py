@@ -65,11 +65,15 @@ class Counts:
             return None
         return times[middle] if len(times) % 2 else 0.5 * (times[middle - 1] + times[middle])
 
-    def line(self, title: str, state: str, ape: float | None) -> Line:
-        """The variant's line; an empty `state` is the last scan's health."""
-        return Line(
-            title, state or self.health, self.scans, ape, self.lambda_min, self.rejected, self.ms
-        )
+    def line(self, title: str, state: str, ape: float | None, poses: int = 0) -> Line:
+        """The variant's line; an empty `state` is the last scan's health.
+
+        `poses` tell of one that gives no diagnostics, as an upstream node.
+        """
+        scans, health = self.scans, self.health
+        if scans == 0 and poses > 0:
+            scans, health = poses, "-"
+        return Line(title, state or health, scans, ape, self.lambda_min, self.rejected, self.ms)
 
 
 def number(text: object) -> float | None:

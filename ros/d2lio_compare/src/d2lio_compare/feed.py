@@ -97,9 +97,8 @@ class Feed:
 
     def line(self) -> Line:
         """Its line of the scoreboard."""
-        return self._counts.line(
-            self.variant.title, DEAD if self.dead else "", self.ape.rmse() if self.pose else None
-        )
+        ape = self.ape.rmse() if self.pose else None
+        return self._counts.line(self.variant.title, DEAD if self.dead else "", ape, len(self.ape))
 
     def close(self) -> None:
         """Closes its files."""

@@ -5,16 +5,22 @@
 from __future__ import annotations
 
 import json
-from typing import NamedTuple
+from typing import Any, NamedTuple
 from xml.etree import ElementTree
 
+from d2lio_compare import upstream
 from d2lio_compare.shared.names import Variant
 
 NODE_NAME = "d2lio"
 SCOREBOARD = "scoreboard"
 PLAYER = "/player"
-NODES = "nodes"  # below the output directory: what the nodes save, one directory each
 PACKAGES = {"fastlio": "d2lio_fastlio", "liosam": "d2lio_liosam", "d2lio": "d2lio_liosam"}
+NODES = "nodes"  # below the output directory: what the nodes save, one directory each
+
+
+def node_of(variant: Variant) -> str:
+    """Full name of the node that gives a variant's odometry."""
+    return f"/{variant.id}/{upstream.NODES.get(variant.upstream, NODE_NAME)}"
 
 
 class Setting(NamedTuple):
@@ -22,13 +28,14 @@ class Setting(NamedTuple):
 
     Attributes:
         out: output directory, absolute.
-        config: data description of the recording, empty for none.
+        config: data description of the recording, empty for none; description: its content.
         truth_file, truth_topic: at most one is not empty.
         sim_time: whether a bag's clock is used.
     """
 
     out: str
     config: str
+    description: dict[str, Any]
     truth_file: str
     truth_topic: str
     lidar_topic: str
@@ -47,7 +54,8 @@ def write(variants: list[Variant], setting: Setting) -> str:
     for variant in variants:
         group = ElementTree.SubElement(root, "group", ns=variant.id)
         if variant.upstream:
-            _UPSTREAM[variant.upstream](group, setting)
+            topics = setting.lidar_topic, setting.imu_topic
+            upstream.add(group, variant.upstream, *topics, setting.description)
         else:
             _own_node(group, variant, setting)
     _scoreboard(root, variants, setting)
@@ -88,41 +96,6 @@ def _topics(setting: Setting) -> list[tuple[str, str]]:
         ("lidar_type", setting.lidar_type),
     ]
     return [(key, value) for key, value in pairs if value]
-
-
-def _fast_lio(group: ElementTree.Element, setting: Setting) -> None:
-    """Upstream FAST_LIO: its own launch file and configuration, its topics in our namespace."""
-    for theirs in ("Odometry", "path", "cloud_registered", "cloud_registered_body", "Laser_map"):
-        ours = "odometry" if theirs == "Odometry" else theirs
-        ElementTree.SubElement(group, "remap", {"from": f"/{theirs}", "to": ours})
-    include = ElementTree.SubElement(
-        group, "include", file="$(find fast_lio)/launch/mapping_velodyne.launch"
-    )
-    ElementTree.SubElement(include, "arg", name="rviz", value="false")
-    for key, value in (("lid_topic", setting.lidar_topic), ("imu_topic", setting.imu_topic)):
-        if value:
-            _param(group, f"common/{key}", value)
-
-
-def _lio_sam(group: ElementTree.Element, setting: Setting) -> None:
-    """Upstream LIO-SAM without its own RViz; its odometry is that of the LiDAR."""
-    ElementTree.SubElement(
-        group, "rosparam", file="$(find lio_sam)/config/params.yaml", command="load"
-    )
-    pairs = (("pointCloudTopic", setting.lidar_topic), ("imuTopic", setting.imu_topic))
-    for key, value in pairs:
-        if value:
-            _param(group, f"lio_sam/{key}", value)
-    ElementTree.SubElement(group, "remap", {"from": "lio_sam/mapping/odometry", "to": "odometry"})
-    ElementTree.SubElement(group, "remap", {"from": "lio_sam/mapping/path", "to": "path"})
-    cloud = {"from": "lio_sam/mapping/cloud_registered", "to": "cloud_registered"}
-    ElementTree.SubElement(group, "remap", cloud)
-    ElementTree.SubElement(
-        group, "include", file="$(find lio_sam)/launch/include/module_loam.launch"
-    )
-
-
-_UPSTREAM = {"fast_lio": _fast_lio, "lio_sam": _lio_sam}
 
 
 def _scoreboard(root: ElementTree.Element, variants: list[Variant], setting: Setting) -> None:

@@ -23,7 +23,7 @@ import rospkg
 import yaml
 
 from d2lio_compare import graph, launch_file, rviz_file
-from d2lio_compare.launch_file import NODE_NAME, NODES, PLAYER, Setting
+from d2lio_compare.launch_file import NODES, PLAYER, Setting, node_of
 from d2lio_compare.shared.names import UPSTREAMS, Variant, VariantError, parse
 
 EXIT_USAGE, EXIT_FAILED, EXIT_INTERRUPTED = 2, 4, 130
@@ -87,7 +87,8 @@ class Comparison:
         if not options.rate > 0.0:
             raise UsageError(f"rate: {options.rate}; allowed: > 0")
         self._variants = _available(parse(options.variants, options.host))
-        self._bag, self._config, description = _material(options.bag, options.config)
+        self._bag, self._config, self._description = _material(options.bag, options.config)
+        description = self._description
         self._truth = options.truth or _truth_of(self._config, description)
         for kind, file in (("truth", self._truth), ("config", self._config)):
             if file and not os.path.isfile(file):
@@ -137,6 +138,7 @@ class Comparison:
         setting = Setting(
             out=self._out,
             config=self._config,
+            description=self._description,
             truth_file=self._truth,
             truth_topic=options.truth_topic,
             lidar_topic=self._lidar,
@@ -169,7 +171,7 @@ class Comparison:
             [*command, os.path.join(self._out, LAUNCH_FILE)],
             start_new_session=True,  # Ctrl-C reaches it through us, once
         )
-        own = [f"/{v.id}/{NODE_NAME}" for v in self._variants if not v.upstream]
+        own = [node_of(variant) for variant in self._variants]
         self._until(lambda: graph.listening([*own, "/scoreboard"]), START_UP_S)
         late = [name for name in own if not graph.listening([name])]
         if late and self._going():

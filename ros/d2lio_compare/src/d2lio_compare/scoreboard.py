@@ -26,7 +26,7 @@ from std_msgs.msg import Float64, String
 from visualization_msgs.msg import Marker, MarkerArray
 
 from d2lio_compare.feed import Feed
-from d2lio_compare.launch_file import NODE_NAME, NODES
+from d2lio_compare.launch_file import NODES, node_of
 from d2lio_compare.liveness import Liveness
 from d2lio_compare.poses import (
     NO_TRUTH,
@@ -41,6 +41,7 @@ from d2lio_compare.poses import (
 from d2lio_compare.rviz_file import LABELS_TOPIC, MARKERS_TOPIC, TRUTH_TOPIC
 from d2lio_compare.shared.board import HEADERS, Line, cells, plain
 from d2lio_compare.shared.names import Variant, rgb
+from d2lio_compare.upstream import DIAGNOSTICS_TOPIC
 
 TICK_S = 0.5
 QUIET_S = 2.0  # a bag that is done is drained when no variant said anything for so long
@@ -66,7 +67,7 @@ class Scoreboard:
             folder = os.path.join(self._out, NODES, variant.id) if variant.upstream else ""
             lidar = extrinsic if variant.upstream == "lio_sam" else None
             self._feeds.append(Feed(variant, self._truth, folder, lidar))
-        self._liveness = Liveness([f"/{v.id}/{NODE_NAME}" for v in variants if not v.upstream])
+        self._liveness = Liveness([node_of(variant) for variant in variants])
         self._truth_rows: list[tuple[int, np.ndarray, np.ndarray]] = []
         self._truth_shown = False
         self._printed, self._text = 0.0, ""
@@ -108,7 +109,7 @@ class Scoreboard:
         for feed in self._feeds:
             ns = f"/{feed.variant.id}"
             rospy.Subscriber(f"{ns}/odometry", Odometry, self._on_odometry, feed, tcp_nodelay=True)
-            topic = f"{ns}/d2lio/diagnostics" if feed.variant.upstream else f"{ns}/diagnostics"
+            topic = f"{ns}/{DIAGNOSTICS_TOPIC}" if feed.variant.upstream else f"{ns}/diagnostics"
             rospy.Subscriber(topic, DiagnosticArray, self._on_diagnostics, feed)
             coloured = rospy.Publisher(f"{ns}/{MARKERS_TOPIC}", MarkerArray, queue_size=2)
             passed = (feed.variant, coloured)
@@ -156,7 +157,7 @@ class Scoreboard:
         with self._lock:
             self._take_truth()
             for feed in self._feeds:
-                gone = f"/{feed.variant.id}/{NODE_NAME}" in dead
+                gone = node_of(feed.variant) in dead
                 if gone and not feed.dead:
                     rospy.logerr("%s is DEAD; the others go on", feed.variant.title)
                 feed.dead = feed.dead or gone
