@@ -30,7 +30,7 @@ cmd_lint() {
     check 'ruff format' "$bin/ruff" format --quiet --check .
     check codespell "$bin/codespell"
     check 'vermin (Python 3.8: the patch tool, and what ROS runs)' "$bin/vermin" --quiet --no-tips \
-        -t=3.8- patches/tool ros/d2lio_compare/src ros/d2lio_compare/scripts
+        -t=3.8- patches/tool ros/d2lio_compare ablation/d2lio/compare/shared
     if command -v shellcheck >/dev/null; then
         check shellcheck shellcheck -x -a d2lio tools/door/build_gtsam.sh .ci/run
     else

@@ -7,6 +7,7 @@ What is started is ended again, also when the command is interrupted or terminat
 
 from __future__ import annotations
 
+import ctypes
 import os
 import shlex
 import shutil
@@ -38,6 +39,7 @@ LOGS = "ros"
 MASTER_UP_S = 30.0
 STOP_S = 120.0  # for the variants to save and for the report
 GRACE_S = 5.0
+PR_SET_PDEATHSIG = 1
 EXIT_FAILED, EXIT_INTERRUPTED, EXIT_TERMINATED = 4, 130, 143
 
 
@@ -213,6 +215,7 @@ class _Processes:
                 stdout=stream,
                 stderr=None if log is None else subprocess.STDOUT,
                 start_new_session=True,
+                preexec_fn=_end_with_us,
             )
         self._all.append(process)
         return process
@@ -226,6 +229,12 @@ class _Processes:
             with suppress(subprocess.TimeoutExpired):
                 process.wait(STOP_S)
         return self._told
+
+
+def _end_with_us() -> None:
+    """Has the child told to end when we are killed (Linux alone can)."""
+    with suppress(OSError, AttributeError):
+        ctypes.CDLL(None).prctl(PR_SET_PDEATHSIG, signal.SIGINT)
 
 
 def _end(process: subprocess.Popen[bytes]) -> None:

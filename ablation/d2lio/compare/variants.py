@@ -9,8 +9,9 @@ from d2lio.ablate.suite import Variant as SuiteVariant
 from d2lio.compare.shared import names
 from d2lio.compare.shared.names import Variant, VariantError
 from d2lio.errors import ConfigError
+from d2lio.report.ablation import COMPARISON
 
-SUITE_NAME = "compare"
+SUITE_NAME = COMPARISON
 LIMIT_S = 6 * 3600.0
 LIMIT_MB = 8000.0
 
@@ -48,6 +49,7 @@ def suite_of(variants: list[Variant], sequence: SuiteSequence) -> Suite:
     return Suite(
         name=SUITE_NAME,
         title=f"Variants on {sequence.name}",
+        description="Variants side by side.",
         repeats=1,
         limits={"time_s": LIMIT_S, "memory_mb": LIMIT_MB},
         layout=Layout(rows="variant", columns="sequence"),

@@ -26,6 +26,7 @@ from d2lio.report.printed import FIGURES_DIR, write_figures
 from d2lio.report.series import RunSeries, read_series
 
 REPORT_FILE = "report.html"
+COMPARISON = "compare"  # name of the suite that `d2lio compare` makes
 
 
 def write(results: Results, out: Path) -> Path:
@@ -255,6 +256,9 @@ def _made(results: Results, drawn: list[Path]) -> str:
 
 def _command(results: Results) -> str:
     """What makes the same ablation again; the suite that was run lies beside the page."""
+    if results.suite.name == COMPARISON:
+        ids = ",".join(variant.id for variant in results.suite.variants)
+        return f"d2lio compare {results.suite.sequences[0].name}: {ids}"
     known = shipped().get(results.suite.name)
     if known is not None and Suite.load(known) == results.suite:
         return f"d2lio ablate {results.suite.name}"

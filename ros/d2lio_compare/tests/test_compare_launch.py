@@ -176,6 +176,16 @@ def test_stopping_it_saves_everything_and_leaves_no_process(
     assert (run.out / "report.html").is_file()
 
 
+def test_killed_itself_it_leaves_no_process(launched, room: Path) -> None:
+    run = launched(str(room), "--variants", "off,d2")
+    run.wait_until(lambda: run.scans("off") > 5)
+    begun = run.processes()
+    run.signal(signal.SIGKILL)
+    assert run.wait() == -signal.SIGKILL
+    assert psutil.wait_procs(begun, timeout=40.0)[1] == []
+    assert len(read_tum(run.out / "nodes" / "off" / "trajectory.tum")) > 5
+
+
 def test_an_unknown_variant_is_refused_at_once(launched, room: Path) -> None:
     run = launched(str(room), "--variants", "off,turbo")
     assert run.wait() == 2

@@ -9,6 +9,7 @@ roslaunch on it, and plays the bag when all of them listen.
 from __future__ import annotations
 
 import argparse
+import ctypes
 import json
 import os
 import shlex
@@ -17,6 +18,7 @@ import signal
 import subprocess
 import sys
 import time
+from contextlib import suppress
 from typing import Any
 
 import rospkg
@@ -31,10 +33,11 @@ META_FILE = "compare.json"
 LAUNCH_FILE, RVIZ_FILE = "variants.launch", "compare.rviz"
 START_UP_S = 30.0
 DRAIN_S = 1800.0
-NODE_STOP_S = 30.0  # for a node to save; they do it at the same time
-STOP_S = 40.0
+NODE_STOP_S = 10.0  # roslaunch grants us 15 in all; nodes write while they run
+STOP_S = 20.0
 TICK_S = 0.2
 QUEUE = 2000  # messages a subscriber may be behind before the player drops some
+PR_SET_PDEATHSIG = 1
 SEQUENCE_FILE = "sequence.yaml"
 
 
@@ -170,6 +173,7 @@ class Comparison:
         self._roslaunch = subprocess.Popen(
             [*command, os.path.join(self._out, LAUNCH_FILE)],
             start_new_session=True,  # Ctrl-C reaches it through us, once
+            preexec_fn=_end_with_us,
         )
         own = [node_of(variant) for variant in self._variants]
         self._until(lambda: graph.listening([*own, "/scoreboard"]), START_UP_S)
@@ -184,7 +188,11 @@ class Comparison:
             return
         command = ["rviz", "-d", os.path.join(self._out, RVIZ_FILE), "__name:=compare_rviz"]
         self._rviz = subprocess.Popen(
-            command, stdin=subprocess.DEVNULL, stderr=subprocess.DEVNULL, start_new_session=True
+            command,
+            stdin=subprocess.DEVNULL,
+            stderr=subprocess.DEVNULL,
+            start_new_session=True,
+            preexec_fn=_end_with_us,
         )
 
     def _play(self) -> None:
@@ -203,6 +211,7 @@ class Comparison:
             stdin=subprocess.DEVNULL,
             stdout=subprocess.DEVNULL,  # keys to press, which reach nobody
             start_new_session=True,
+            preexec_fn=_end_with_us,
         )
         self._until(lambda: graph.connected(PLAYER, topics), START_UP_S)
         if not self._going():
@@ -268,6 +277,12 @@ class Comparison:
             stdin=subprocess.DEVNULL,
             start_new_session=True,
         )
+
+
+def _end_with_us() -> None:
+    """Has the child told to end when we are killed (Linux alone can)."""
+    with suppress(OSError, AttributeError):
+        ctypes.CDLL(None).prctl(PR_SET_PDEATHSIG, signal.SIGINT)
 
 
 def _stop(process: subprocess.Popen[bytes], patience_s: float) -> None:
