@@ -26,6 +26,8 @@ readonly ROS_INPUTS=(
     ros/livox_ros_driver ros/d2lio_compare
 )
 
+# In a shell of its own, so that the lists of the verbs stay as they are.
+# shellcheck disable=SC2030,SC2031
 missing_ros_packages() { (
     SYSTEM_PACKAGES=("${ROS_PACKAGES[@]}") GTSAM_PACKAGES=()
     missing_packages
@@ -83,6 +85,7 @@ test_ros() { # PYTEST ARGUMENTS...
         echo '0 passed, 0 failed, 1 skipped (left out: ROS nodes: not installed)'
         return
     fi
+    # shellcheck disable=SC2031 # see missing_ros_packages
     SYSTEM_PACKAGES+=(libgtest-dev)
     setup_python
     setup_ros
