@@ -1,6 +1,7 @@
 // SPDX-FileCopyrightText: 2026 D2-LIO contributors
 // SPDX-License-Identifier: BSD-3-Clause
 #include <algorithm>
+#include <type_traits>
 
 #include "d2lio/ros1/byte_reader.hpp"
 #include "d2lio/ros1/decode.hpp"
@@ -93,6 +94,17 @@ void each(const Cloud& cloud, const Field& field, const F& f) {
             return each_value<float>(cloud, field, f);
         default:
             return each_value<double>(cloud, field, f);
+    }
+}
+
+/// What a driver that stores rings as real numbers means; 0 for what is none.
+template <typename T>
+std::uint16_t to_ring(T value) {
+    if constexpr (std::is_floating_point_v<T>) {
+        const bool fits = value >= T{0} && value <= T{65535};
+        return fits ? static_cast<std::uint16_t>(value) : std::uint16_t{0};
+    } else {
+        return static_cast<std::uint16_t>(value);
     }
 }
 
@@ -193,8 +205,7 @@ bool decode_point_cloud2(const RawMessage& message, const std::string& time_fiel
     }
     if (time != nullptr) read_times(cloud, *time, out);
     if (const Field* field = cloud.first_of(kRingFields)) {
-        each(cloud, *field,
-             [&out](std::size_t i, auto v) { out.points[i].ring = static_cast<std::uint16_t>(v); });
+        each(cloud, *field, [&out](std::size_t i, auto v) { out.points[i].ring = to_ring(v); });
     }
     if (const Field* field = cloud.first_of(kIntensityFields)) {
         each(cloud, *field,

@@ -84,9 +84,16 @@ Recorder::Recorder(std::string folder) : folder_(std::move(folder)) {
     if (folder_.empty()) return;
     std::error_code error;
     fs::create_directories(folder_, error);
+    // Of an earlier run; what this one writes must not mix with it.
+    for (int i = 1; fs::remove(finished_name(i), error); ++i) {
+    }
     diagnostics_.open(folder_ + "/diagnostics.csv");
     begin_trajectory();
     if (!diagnostics_ || !trajectory_) error_ = folder_ + " cannot be written";
+}
+
+std::string Recorder::finished_name(int epoch) const {
+    return folder_ + "/trajectory." + std::to_string(epoch) + ".tum";
 }
 
 void Recorder::begin_trajectory() {
@@ -100,8 +107,7 @@ void Recorder::begin_epoch() {
     if (!trajectory_.is_open()) return;
     trajectory_.close();
     std::error_code error;
-    fs::rename(folder_ + "/trajectory.tum",
-               folder_ + "/trajectory." + std::to_string(epochs_) + ".tum", error);
+    fs::rename(folder_ + "/trajectory.tum", finished_name(epochs_), error);
     begin_trajectory();
 }
 
@@ -148,6 +154,7 @@ void Recorder::finish(const RunSummary& summary) {
     if (folder_.empty()) return;
     trajectory_.close();
     diagnostics_.close();
+    if (!trajectory_ || !diagnostics_) error_ = folder_ + ": not everything could be written";
     const std::string error = replace_file(folder_ + "/run.json", run_json(summary));
     if (!error.empty()) error_ = error;
 }

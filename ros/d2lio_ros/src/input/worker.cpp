@@ -240,7 +240,7 @@ void Worker::replace(std::unique_ptr<Estimator> estimator) {
     recount();
 }
 
-std::string Worker::set_params(const ParamMap& changes) {
+bool Worker::set_params(const ParamMap& changes) {
     ParamMap next = params_;
     for (const auto& [key, value] : changes) next[key] = value;
     auto fresh = config_.kind->make(next, config_.node.threads);  // refuses what is wrong
@@ -251,7 +251,7 @@ std::string Worker::set_params(const ParamMap& changes) {
         replace(std::move(fresh));
     }
     params_ = std::move(next);
-    return goes_on ? "changed; the estimate goes on" : "changed; the estimator started anew";
+    return goes_on;
 }
 
 }  // namespace d2lio::ros1

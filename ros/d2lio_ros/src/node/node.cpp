@@ -76,15 +76,37 @@ void Node::stop() {
     }
 }
 
+/// Nothing that a message brings may end the node.
+template <typename F>
+void Node::guarded(const F& f) {
+    try {
+        f();
+    } catch (const std::exception& e) {
+        complaints_.tell("exception", std::string("a message was given up: ") + e.what());
+    }
+}
+
 void Node::on_imu(const Message::ConstPtr& message) {
+    guarded([&] { take_imu(*message); });
+}
+
+void Node::on_cloud(const Message::ConstPtr& message) {
+    guarded([&] { take_cloud(*message); });
+}
+
+void Node::on_timer() {
+    guarded([this] { tell_input(); });
+}
+
+void Node::take_imu(const Message& message) {
     const Clock::time_point now = Clock::now();
-    if (message->getDataType() != kImuType) {
-        complaints_.tell("imu_type", config_.node.imu_topic + " carries " + message->getDataType() +
+    if (message.getDataType() != kImuType) {
+        complaints_.tell("imu_type", config_.node.imu_topic + " carries " + message.getDataType() +
                                          ", not " + kImuType + ": nothing can be estimated");
         return;
     }
     ImuSample sample;
-    if (!decode_imu(raw_message(*message), config_.source.accel_scale(), config_.source.orientation,
+    if (!decode_imu(raw_message(message), config_.source.accel_scale(), config_.source.orientation,
                     sample)) {
         complaints_.tell("imu_message", "a message on " + config_.node.imu_topic + " is truncated");
         return;
@@ -105,10 +127,10 @@ bool Node::right_lidar_type(const std::string& type) {
     return false;
 }
 
-void Node::on_cloud(const Message::ConstPtr& message) {
+void Node::take_cloud(const Message& message) {
     const Clock::time_point now = Clock::now();
-    if (!right_lidar_type(message->getDataType())) return;
-    QueuedScan scan{raw_message(*message), 0, now};
+    if (!right_lidar_type(message.getDataType())) return;
+    QueuedScan scan{raw_message(message), 0, now};
     const std::optional<Stamp> stamp = scan.message.stamp();
     if (!stamp) {
         complaints_.tell("scan_message",
@@ -132,7 +154,7 @@ void Node::on_result(const ScanResult& result, const ResultContext& context) {
     }
 }
 
-void Node::on_timer() {
+void Node::tell_input() {
     const InputQueue::Counts q = worker_.queue().counts();
     const std::string silent = watch_.complaint(Clock::now());
     if (!silent.empty()) complaints_.tell("silent", silent);

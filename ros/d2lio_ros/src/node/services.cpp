@@ -54,7 +54,10 @@ bool Node::set_mode(SetMode::Request& request, SetMode::Response& response) {
         if (!request.degeneracy_method.empty()) {
             changes["degeneracy.method"] = request.degeneracy_method;
         }
-        response.message = worker_.set_params(changes);
+        const bool goes_on = worker_.set_params(changes);
+        if (!goes_on) outputs_.forget_path();
+        response.message =
+            goes_on ? "changed; the estimate goes on" : "changed; the estimator started anew";
         response.success = true;
         ROS_INFO_STREAM("mode '" << request.rejection_mode << "', method '"
                                  << request.degeneracy_method << "': " << response.message);

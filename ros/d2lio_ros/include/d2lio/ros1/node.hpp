@@ -33,10 +33,15 @@ class Node {
 
   private:
     using Message = topic_tools::ShapeShifter;
+    template <typename F>
+    void guarded(const F& f);
     void on_imu(const Message::ConstPtr& message);
     void on_cloud(const Message::ConstPtr& message);
     void on_result(const ScanResult& result, const ResultContext& context);
     void on_timer();
+    void take_imu(const Message& message);
+    void take_cloud(const Message& message);
+    void tell_input();
     using SaveFile = d2lio_ros::SaveFile;
     using SetMode = d2lio_ros::SetMode;
     bool save_map(SaveFile::Request& request, SaveFile::Response& response);

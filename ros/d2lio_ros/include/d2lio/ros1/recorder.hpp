@@ -58,6 +58,7 @@ class Recorder {
 
   private:
     void begin_trajectory();
+    std::string finished_name(int epoch) const;
     void count(const ScanResult& result);
     std::string run_json(const RunSummary& summary) const;
 

@@ -52,9 +52,9 @@ class Worker {
     std::vector<Eigen::Vector3f> map_points() const { return estimator_->map_points(); }
     std::optional<ScanPoints> scan_points() const { return estimator_->scan_points(); }
     void reset();
-    /// Changes parameters; the estimate goes on if the host can. @return what happened
+    /// Changes parameters. @return whether the estimate goes on; else the estimator started anew
     /// @throws ConfigError, nothing changed then
-    std::string set_params(const ParamMap& changes);
+    bool set_params(const ParamMap& changes);
 
     /// What became of all scans, by name; thread-safe, as of the last scan.
     std::map<std::string, std::size_t> counts() const;
