@@ -102,6 +102,7 @@ def collect(out: Path) -> Results:
     truth = Path(meta.truth) if meta.truth and Path(meta.truth).is_file() else None
     dead = _dead(out)
     rows, timings = [], []
+    shutil.rmtree((out / run_directory(meta.sequence, 0, "any")).parent, ignore_errors=True)
     for variant in variants:
         spec = _spec(suite, variant, meta)
         outcome = _outcome(out, spec, truth, variant.id in dead)
@@ -136,7 +137,6 @@ def _spec(suite: Suite, variant: Variant, meta: Meta) -> CellSpec:
 def _outcome(out: Path, spec: CellSpec, truth: Path | None, dead: bool) -> Outcome:
     outcome = Outcome(digest=spec.digest(), scores=Scores(status="ok"))
     place = out / spec.directory
-    shutil.rmtree(place, ignore_errors=True)
     place.mkdir(parents=True)
     for name in (TRAJECTORY_FILE, DIAGNOSTICS_FILE, "run.json"):
         with suppress(OSError):

@@ -68,11 +68,17 @@ def _param(parent: ElementTree.Element, name: str, value: object, kind: str = "s
     ElementTree.SubElement(parent, "param", attributes)
 
 
+def _node(parent: ElementTree.Element, package: str, kind: str, name: str) -> ElementTree.Element:
+    """A node that knows nothing of what an earlier comparison left at the same master."""
+    attributes = {"pkg": package, "type": kind, "name": name}
+    return ElementTree.SubElement(
+        parent, "node", {**attributes, "output": "screen", "clear_params": "true"}
+    )
+
+
 def _own_node(group: ElementTree.Element, variant: Variant, setting: Setting) -> None:
     package = PACKAGES[variant.host]
-    node = ElementTree.SubElement(
-        group, "node", pkg=package, type=package, name=NODE_NAME, output="screen"
-    )
+    node = _node(group, package, package, NODE_NAME)
     if package == "d2lio_liosam":
         _param(node, "estimator", variant.host)
     for key, value in _topics(setting):
@@ -99,9 +105,7 @@ def _topics(setting: Setting) -> list[tuple[str, str]]:
 
 
 def _scoreboard(root: ElementTree.Element, variants: list[Variant], setting: Setting) -> None:
-    node = ElementTree.SubElement(
-        root, "node", pkg="d2lio_compare", type="scoreboard.py", name=SCOREBOARD, output="screen"
-    )
+    node = _node(root, "d2lio_compare", "scoreboard.py", SCOREBOARD)
     _param(node, "out", setting.out)
     _param(node, "truth_file", setting.truth_file)
     _param(node, "truth_topic", setting.truth_topic)

@@ -152,24 +152,34 @@ class Scoreboard:
                 feed.close()
 
     def _tick(self) -> None:
-        stopping = rospy.get_param("~stopping", False)
-        dead = set() if stopping else self._liveness.dead()
+        if not rospy.get_param("~stopping", False):
+            self._mark(self._liveness.dead())
         with self._lock:
             self._take_truth()
+            quiet = all(feed.quiet(QUIET_S) for feed in self._feeds)
+        finished = not self._drained and quiet and rospy.get_param("~bag_done", False)
+        if finished:
+            self._mark(self._liveness.dead(at_once=True))  # one may have died just now
+        self._tell()
+        if finished:
+            self._drained = True
+            rospy.set_param("~drained", True)
+
+    def _mark(self, dead: set[str]) -> None:
+        """Notes which variants are gone."""
+        with self._lock:
             for feed in self._feeds:
-                gone = node_of(feed.variant) in dead
-                if gone and not feed.dead:
+                if node_of(feed.variant) in dead and not feed.dead:
                     rospy.logerr("%s is DEAD; the others go on", feed.variant.title)
-                feed.dead = feed.dead or gone
+                    feed.dead = True
+
+    def _tell(self) -> None:
+        with self._lock:
             lines = [feed.line() for feed in self._feeds]
             poses = [feed.pose for feed in self._feeds]
-            quiet = all(feed.quiet(QUIET_S) for feed in self._feeds)
         self._publish(lines, poses)
         self._print(lines)
         self._save(lines)
-        if not self._drained and quiet and rospy.get_param("~bag_done", False):
-            self._drained = True
-            rospy.set_param("~drained", True)
 
     def _take_truth(self) -> None:
         """Hands on what came by topic, and shows the truth once a variant has begun."""
