@@ -11,6 +11,8 @@ constexpr std::uint32_t kQueue = 100;                    // messages that a slow
 constexpr std::size_t kMostPoses = 4000;                 // of a path; beyond, every other one stays
 constexpr std::chrono::milliseconds kPathInterval{500};  // it is sent whole every time
 
+constexpr char kAllDiagnostics[] = "/diagnostics";
+
 diagnostic_msgs::KeyValue key_value(const std::string& key, const std::string& value) {
     diagnostic_msgs::KeyValue out;
     out.key = key;
@@ -31,9 +33,13 @@ Outputs::Outputs(ros::NodeHandle& node, const Configuration& config, std::string
       cloud_(node.advertise<sensor_msgs::PointCloud2>("cloud_registered", kQueue)),
       map_(node.advertise<sensor_msgs::PointCloud2>("map", 1, true)),
       diagnostics_(node.advertise<diagnostic_msgs::DiagnosticArray>("diagnostics", kQueue)),
-      all_diagnostics_(node.advertise<diagnostic_msgs::DiagnosticArray>("/diagnostics", kQueue)),
       markers_(node.advertise<visualization_msgs::MarkerArray>("markers", kQueue)),
       rejected_(node.advertise<sensor_msgs::PointCloud2>("rejected", kQueue)) {
+    // In the root namespace both are one topic.
+    if (diagnostics_.getTopic() != kAllDiagnostics) {
+        all_diagnostics_ =
+            node.advertise<diagnostic_msgs::DiagnosticArray>(kAllDiagnostics, kQueue);
+    }
     if (config.node.publish_tf) transforms_ = std::make_unique<tf2_ros::TransformBroadcaster>();
     path_message_.header.frame_id = frames_.map;
 }
@@ -102,8 +108,12 @@ void Outputs::publish_diagnostics(const ScanResult& result, const ResultContext&
     status.values.push_back(key_value("queue", std::to_string(context.queue)));
     status.values.push_back(key_value("dropped", std::to_string(context.dropped)));
     array.status.push_back(std::move(status));
+    publish_status(array);
+}
+
+void Outputs::publish_status(const diagnostic_msgs::DiagnosticArray& array) {
     diagnostics_.publish(array);
-    all_diagnostics_.publish(array);
+    if (all_diagnostics_) all_diagnostics_.publish(array);
 }
 
 void Outputs::input_status(std::uint8_t level, const std::string& message,
@@ -119,8 +129,7 @@ void Outputs::input_status(std::uint8_t level, const std::string& message,
         status.values.push_back(key_value(name, std::to_string(value)));
     }
     array.status.push_back(std::move(status));
-    diagnostics_.publish(array);
-    all_diagnostics_.publish(array);
+    publish_status(array);
 }
 
 bool Outputs::map_due() const {

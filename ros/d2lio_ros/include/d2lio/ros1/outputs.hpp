@@ -42,13 +42,14 @@ class Outputs {
     void publish_path(const ScanResult& result);
     void publish_cloud(const ScanResult& result, const Scan& scan);
     void publish_diagnostics(const ScanResult& result, const ResultContext& context);
+    void publish_status(const diagnostic_msgs::DiagnosticArray& array);
 
     Frames frames_;
     std::string name_, host_;
     double blind_;
     double map_period_;
-    ros::Publisher odometry_, path_, cloud_, map_, diagnostics_, all_diagnostics_, markers_,
-        rejected_;
+    ros::Publisher odometry_, path_, cloud_, map_, diagnostics_, markers_, rejected_;
+    ros::Publisher all_diagnostics_;  ///< none where `diagnostics_` is the same topic
     std::unique_ptr<tf2_ros::TransformBroadcaster> transforms_;
     nav_msgs::Path path_message_;
     std::size_t path_stride_ = 1, path_seen_ = 0;
