@@ -6,6 +6,7 @@ from __future__ import annotations
 
 import csv
 import json
+import signal
 import time
 from pathlib import Path
 
@@ -153,3 +154,19 @@ def test_simulated_time_changes_nothing(ros, simulated, offline, assert_same, tm
     finally:
         assert ros.run("rosparam set /use_sim_time false") == 0
     assert_same(tmp_path / "out", offline("fastlio"))
+
+
+def test_a_killed_node_leaves_what_it_had(ros, simulated, offline, tmp_path):
+    node = ros.node(
+        "d2lio_fastlio", "killed", sequence_config=simulated.config, save_dir=tmp_path,
+        queue_scans=0,
+    )  # fmt: skip
+    ros.play(simulated.bag, 4.0)
+    time.sleep(SETTLE_S)
+    ros.end(node, signal.SIGKILL)
+    found = np.loadtxt(tmp_path / "trajectory.tum")
+    expected = np.loadtxt(offline("fastlio") / "trajectory.tum")
+    assert len(found) >= len(expected) - 1
+    np.testing.assert_allclose(found, expected[: len(found)], rtol=0.0, atol=1e-9)
+    rows = list(csv.DictReader((tmp_path / "diagnostics.csv").open()))
+    assert rows[-1]["time_total_ms"]  # the last line is whole
