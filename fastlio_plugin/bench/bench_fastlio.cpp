@@ -121,10 +121,10 @@ void BM_Condition(benchmark::State& state) {
     const Mat23x23 P = Mat23x23::Identity();
     Adapter adapter;
     adapter.set("degeneracy.method", "paper");
-    adapter.begin_scan({view, view, P.data(), 23, 0, 3, 1});
+    adapter.begin_scan({view, view, P.data(), 23, 0, 3, 1, false});
     PriorBlock prior{};
     for (auto _ : state) {
-        adapter.condition({H.data(), r.data(), kRows, 12, 1, 0, 3}, view, 0.001, &prior);
+        adapter.condition({H.data(), r.data(), kRows, 12, 1, 0, 3, 6}, view, 0.001, &prior);
         benchmark::DoNotOptimize(prior);
     }
 }

@@ -55,7 +55,8 @@ struct Scene {
                 23,
                 0,
                 3,
-                points};
+                points,
+                false};
     }
     PoseView view() const { return {predicted.R.data(), predicted.t.data()}; }
 };
@@ -63,7 +64,7 @@ struct Scene {
 using RowMatrix = Eigen::Matrix<double, Eigen::Dynamic, 12, Eigen::RowMajor>;
 
 Rows view(RowMatrix& H, Eigen::VectorXd& r) {
-    return {H.data(), r.data(), static_cast<int>(H.rows()), 12, 1, 0, 3};
+    return {H.data(), r.data(), static_cast<int>(H.rows()), 12, 1, 0, 3, 6};
 }
 
 TEST(Adapter, RefusesUnknownKeysAndBadValuesByName) {
@@ -303,7 +304,7 @@ TEST(Adapter, ColumnMajorRowsGiveTheSame) {
     a.set("degeneracy.method", "paper");
     a.begin_scan(Scene().input());
     a.condition(view(H, r), Scene().view(), kVariance, &p);
-    a.condition({C.data(), r.data(), 50, 1, 50, 0, 3}, Scene().view(), kVariance, &q);
+    a.condition({C.data(), r.data(), 50, 1, 50, 0, 3, 6}, Scene().view(), kVariance, &q);
     for (int i = 0; i < 6; ++i) {
         for (int j = 0; j < 6; ++j) EXPECT_EQ(p.jacobian[i][j], q.jacobian[i][j]);
     }

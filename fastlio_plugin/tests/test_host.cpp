@@ -14,7 +14,7 @@ namespace {
 constexpr double kRoomError = 0.05;  // m, over 4 s with 1 cm range noise
 
 const char* const kModes[] = {"off", "none", "fixed", "kiss", "point_adaptive"};
-const char* const kMethods[] = {"none", "paper", "remap"};
+const char* const kMethods[] = {"none", "paper", "remap", "noise_aware"};
 
 bool same(const ScanResult& a, const ScanResult& b) {
     return a.stamp == b.stamp && a.status == b.status && a.state.pos == b.state.pos &&
@@ -54,8 +54,12 @@ TEST(Host, EstimatesTheExtrinsicOnline) {
 }
 
 TEST(Host, ResultsDoNotDependOnTheThreadCountAndRepeat) {
+    std::vector<ParamMap> runs{{{"degeneracy.method", "noise_aware"}}};
     for (const char* mode : kModes) {
-        const ParamMap params{{"rejection.mode", mode}, {"degeneracy.method", "paper"}};
+        runs.push_back({{"rejection.mode", mode}, {"degeneracy.method", "paper"}});
+    }
+    for (const ParamMap& params : runs) {
+        const std::string mode = params.begin()->second + " " + params.rbegin()->second;
         const auto one = test::run(params, 1), two = test::run(params, 2),
                    again = test::run(params, 2);
         ASSERT_EQ(one.size(), two.size());
@@ -147,6 +151,7 @@ TEST(HostConfig, RefusesWhatCannotWork) {
     refused({{"preprocess.blind", "10"}, {"preprocess.max_range", "5"}}, "preprocess.max_range");
     refused({{"mapping.extrinsic_R", "1 0 0 0 1 0 0 0 -1"}}, "mapping.extrinsic_R");
     refused({{"degeneracy.w", "inf"}}, "degeneracy.w");
+    refused({{"degeneracy.share_low", "1000"}}, "parameters");
     refused({{"imu.gap_reset", "0"}}, "imu.gap_reset");
     refused({{"rejection.mode", "point_adaptive"},
              {"rejection.motion", "deviation"},

@@ -54,7 +54,8 @@ TEST(ScanMatcher, RowsAreTheDerivativeOfTheResidual) {
                           23,
                           0,
                           3,
-                          world.scan.size()};
+                          world.scan.size(),
+                          false};
     adapter.begin_scan(input);
     ScanMatcher matcher(adapter, true, 0.001, 1);
     matcher.begin(world.scan, tree);
@@ -89,7 +90,8 @@ TEST(ScanMatcher, TheExtrinsicHasNoColumnsUnlessEstimated) {
                         23,
                         0,
                         3,
-                        world.scan.size()});
+                        world.scan.size(),
+                        false});
     matcher.begin(world.scan, tree);
     Linearisation rows;
     ASSERT_TRUE(matcher.measure(x, true, rows));

@@ -15,6 +15,7 @@ std::variant<NoPrior, PaperPrior, RemapPrior> make_policy(const DegeneracyConfig
             return PaperPrior{c.form, c.w, c.lambda_min};
         case DegeneracyMethod::kRemap:
             return RemapPrior{c.threshold_r, c.threshold_t};
+        case DegeneracyMethod::kNoiseAware:  // acts on the rows, not by a prior
         case DegeneracyMethod::kNone:
             break;
     }
@@ -24,8 +25,8 @@ std::variant<NoPrior, PaperPrior, RemapPrior> make_policy(const DegeneracyConfig
 }  // namespace
 
 void DegeneracyConfig::bind(ParamTable& table) {
-    table.add("degeneracy.method", method, {"none", "paper", "remap"},
-              "prior in the degeneracy slot");
+    table.add("degeneracy.method", method, {"none", "paper", "remap", "noise_aware"},
+              "what is done where the scan cannot see");
     table.add("degeneracy.form", form, {"congruence", "paper"},
               "weight of method paper: symmetric congruence or the literal product");
     table.add("degeneracy.w", w, {0.0, 1e9}, "", "strength of method paper");
@@ -37,8 +38,24 @@ void DegeneracyConfig::bind(ParamTable& table) {
               "rotation eigenvalue below which method remap keeps the prediction");
     table.add("degeneracy.threshold_t", threshold_t, {0.0, 1e9}, "points",
               "translation eigenvalue below which method remap keeps the prediction");
+    table.add("degeneracy.share_low", noise_aware.share_low, {0.0, 1e3}, "",
+              "share of a direction's information that may be noise before method noise_aware acts");
+    table.add("degeneracy.share_high", noise_aware.share_high, {1e-6, 1e3}, "",
+              "share from which on method noise_aware acts fully; above share_low");
+    table.add("degeneracy.significance", noise_aware.significance, {0.0, 1e3}, "sigma",
+              "by which a normal's component along such a direction must exceed its own noise");
+    table.add("degeneracy.rest", rest,
+              "method noise_aware: hold the pose and learn the IMU's noise until it first moves");
     table.add("degeneracy.weak_share", weak_share, {0.0, 1.0 / 3.0}, "",
               "a direction whose eigenvalue is below this share of the trace is reported as weak");
+}
+
+void DegeneracyConfig::validate() const {
+    const auto text = [](double v) { return std::to_string(v); };
+    if (!(noise_aware.share_high > noise_aware.share_low)) {
+        throw ConfigError("degeneracy.share_high", text(noise_aware.share_high),
+                          "above degeneracy.share_low (" + text(noise_aware.share_low) + ")");
+    }
 }
 
 DirectionalPrior::DirectionalPrior(const DegeneracyConfig& config) : policy_(make_policy(config)) {}

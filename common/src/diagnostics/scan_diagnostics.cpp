@@ -79,6 +79,9 @@ Columns ScanDiagnostics::columns() const {
     out.emplace_back("iterations", iterations);
     out.emplace_back("converged", converged ? 1.0 : 0.0);
     add_ranges(by_range, out);
+    add_vector("noise_share", noise_share, out);
+    out.emplace_back("blind", blind);
+    out.emplace_back("cleaned", cleaned);
     return out;
 }
 

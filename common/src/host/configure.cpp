@@ -32,6 +32,24 @@ void configure(const ParamMap& params, ParamTable& table, Plugin& adapter) {
     }
 }
 
+void reconfigure(const ParamMap& changes, Plugin& scratch, Plugin& adapter, ParamMap& params) {
+    std::map<std::string, ParamDoc> docs;
+    for (std::size_t i = 0; i < scratch.param_count(); ++i) {
+        docs[scratch.param(i).key] = scratch.param(i);
+    }
+    ParamMap next = params;
+    for (const auto& [key, value] : changes) {
+        if (docs.count(key) == 0) throw ConfigError(key, value, "no change while running");
+        next[key] = value;
+    }
+    for (const auto& [key, value] : next) {
+        if (docs.count(key) > 0) set_adapter(scratch, docs[key], value);
+    }
+    if (!scratch.check()) throw ConfigError("parameters", "their combination", scratch.error());
+    for (const auto& [key, value] : changes) set_adapter(adapter, docs[key], value);
+    params = std::move(next);
+}
+
 void check_threads(int threads) {
     if (threads < 1 || threads > 256) {
         throw ConfigError("threads", std::to_string(threads), "[1, 256]");

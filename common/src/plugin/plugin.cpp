@@ -42,6 +42,15 @@ PriorTerm Plugin::Core::analyse(const Mat3& AtA_r, const Mat3& AtA_t) {
     return term;
 }
 
+BlindDirections Plugin::Core::find_blind(const SurfaceSums& sums) {
+    const NoiseShare share = noise_share(sums.information, sums.noise);
+    current.noise_share = share.share;
+    current.noise_axes = share.axes;
+    const BlindDirections blind = d2lio::find_blind(share, P_t, degeneracy.noise_aware);
+    current.blind = blind.count;
+    return blind;
+}
+
 void Plugin::Core::keep_spectrum(const Spectrum& s, const PriorTerm& term) {
     current.lambda_r = s.rotation.lambda;
     current.lambda_t = s.translation.lambda;
@@ -108,6 +117,7 @@ bool Plugin::set(const char* key, const char* value) {
 bool Plugin::check() {
     try {
         core_->rejection.validate();
+        core_->degeneracy.validate();
         return true;
     } catch (const ConfigError& e) {
         core_->error = e.what();
@@ -137,6 +147,8 @@ bool Plugin::set_map_voxel(double size) {
 
 bool Plugin::rejects() const { return core_->rejector.active(); }
 bool Plugin::has_prior() const { return core_->prior.active(); }
+bool Plugin::reads_surfaces() const { return core_->degeneracy.cleans_rows(); }
+bool Plugin::starts_at_rest() const { return reads_surfaces() && core_->degeneracy.rest; }
 
 void Plugin::reset() {
     core_->rebuild();
@@ -151,5 +163,8 @@ double Plugin::diagnostics_value(std::size_t i) const {
     return i < core_->columns.size() ? core_->columns[i].second : kNaN;
 }
 const ScanDiagnostics& Plugin::diagnostics() const { return core_->last; }
+const NoiseAwareConfig& Plugin::noise_aware() const { return core_->degeneracy.noise_aware; }
+BlindDirections Plugin::find_blind(const SurfaceSums& sums) { return core_->find_blind(sums); }
+void Plugin::note_cleaned(int rows) { core_->current.cleaned = rows; }
 
 }  // namespace d2lio

@@ -31,6 +31,9 @@ TEST(ScanDiagnostics, CarriesTheValues) {
     d.lambda_t = Vec3(10, 390, 450);
     d.v_t = Mat3::Identity();
     d.converged = true;
+    d.noise_share = Vec3(0.9, 0.1, 0.01);
+    d.blind = 1;
+    d.cleaned = 42;
     std::map<std::string, double> m;
     for (const auto& [k, v] : d.columns()) m[k] = v;
     EXPECT_EQ(m.at("accepted"), 7.0);
@@ -38,7 +41,12 @@ TEST(ScanDiagnostics, CarriesTheValues) {
     EXPECT_EQ(m.at("lambda_t_3"), 450.0);
     EXPECT_EQ(m.at("v_t_1_x"), 1.0);
     EXPECT_EQ(m.at("converged"), 1.0);
+    EXPECT_EQ(m.at("noise_share_1"), 0.9);
+    EXPECT_EQ(m.at("noise_share_3"), 0.01);
+    EXPECT_EQ(m.at("blind"), 1.0);
+    EXPECT_EQ(m.at("cleaned"), 42.0);
     EXPECT_TRUE(std::isnan(m.at("sigma")));
+    EXPECT_TRUE(std::isnan(ScanDiagnostics{}.noise_share[0]));
 }
 
 TEST(ScanDiagnostics, HealthNames) {

@@ -3,6 +3,7 @@
 #include "d2lio/fastlio/adapter.hpp"
 
 #include <Eigen/Cholesky>
+#include <Eigen/Geometry>
 
 #include "d2lio/geometry/so3.hpp"
 #include "d2lio/plugin/core.hpp"
@@ -28,6 +29,10 @@ Mat3 gram(const StridedRows& A) {
     return M;
 }
 
+/// A filter that did not begin at rest knows its velocity from the scans alone: it gets all of them
+/// while it learns it.
+constexpr int kSettlingScans = 20, kRestingScans = 5;
+
 }  // namespace
 
 struct Adapter::Impl {
@@ -35,9 +40,14 @@ struct Adapter::Impl {
     int position_index = 0, rotation_index = 3;
     PriorBlock rows{};
     double variance = 0.0;
+    int scans = 0, rested = 0;  ///< since the last reset
+    bool at_rest = false;
+    std::vector<std::size_t> accepted;  ///< the points behind the rows, in order
 
     bool read(const ScanInput& input, Core& core);
     void copy_rows(const PriorRows& rows);
+    bool settled() const { return scans > kSettlingScans || rested > kRestingScans; }
+    void clean(const Rows& rows, const Pose& x, Core& core);
     Status remove_prior(double* covariance, int size) const;
 };
 
@@ -86,8 +96,11 @@ bool Adapter::Impl::read(const ScanInput& in, Core& core) {
 
 Status Adapter::begin_scan(const ScanInput& input) {
     impl_->rows = PriorBlock{};
-    impl_->gate.begin_scan(input.points);
+    ++impl_->scans;
+    impl_->at_rest = input.at_rest;
+    if (input.at_rest) ++impl_->rested;
     const bool usable = impl_->read(input, core());
+    impl_->gate.begin_scan(input.points, core().predicted.t, core().degeneracy.cleans_rows());
     return core().begin(usable, to_pose(input.previous));
 }
 
@@ -106,6 +119,43 @@ void Adapter::Impl::copy_rows(const PriorRows& p) {
     rows.count = p.count;
 }
 
+/// Takes what noise has put into the rows along blind directions out of them (method noise_aware).
+void Adapter::Impl::clean(const Rows& rows, const Pose& x, Core& core) {
+    accepted.clear();
+    for (std::size_t i = 0; i < gate.book().size(); ++i) {
+        if (gate.book().verdict(i) == Verdict::kAccepted) accepted.push_back(i);
+    }
+    if (static_cast<int>(accepted.size()) != rows.count) return;  // not the rows offered here
+    StridedRows A_t = block(rows, rows.position_column);
+    StridedRows A_r = block(rows, rows.rotation_column);
+    SurfaceSums sums;
+    for (std::size_t k = 0; k < accepted.size(); ++k) {
+        sums.add(A_t.row(static_cast<Eigen::Index>(k)), gate.patch(accepted[k]));
+    }
+    const NoiseAwareConfig& config = core.degeneracy.noise_aware;
+    const BlindDirections blind = core.find_blind(sums);
+    if (blind.count == 0 || at_rest || !settled()) return;
+    for (std::size_t k = 0; k < accepted.size(); ++k) {
+        const std::size_t i = accepted[k];
+        const auto row = static_cast<Eigen::Index>(k);
+        const Vec3 n = A_t.row(row);
+        const CleanedRow cleaned = cleaned_row(n, gate.patch(i), blind, config);
+        if (cleaned.normal == n && cleaned.weight == 1.0) continue;
+        const Vec3 p_imu = x.R.transpose() * (gate.point(i).cast<double>() - x.t);
+        const Vec3 kept = cleaned.weight * cleaned.normal;
+        A_t.row(row) = kept;
+        A_r.row(row) = p_imu.cross(x.R.transpose() * kept);
+        rows.residual[k] *= cleaned.weight;
+        const bool lost = cleaned.normal != n;
+        if (rows.extrinsic_column >= 0) {  // a row that lost something tells nothing of it
+            const double share = lost ? 0.0 : cleaned.weight;
+            block(rows, rows.extrinsic_column).row(row) *= share;
+            block(rows, rows.extrinsic_column + 3).row(row) *= share;
+        }
+        core.current.cleaned += lost ? 1 : 0;
+    }
+}
+
 Status Adapter::condition(const Rows& rows, const PoseView& pose, double variance,
                           PriorBlock* prior) {
     Impl& m = *impl_;
@@ -114,12 +164,14 @@ Status Adapter::condition(const Rows& rows, const PoseView& pose, double varianc
     if (!core().in_scan) return Status::kNoScan;
     StridedRows A_t = block(rows, rows.position_column);
     StridedRows A_r = block(rows, rows.rotation_column);
+    const Pose x = to_pose(pose);
+    core().current.cleaned = 0;
+    if (core().degeneracy.cleans_rows() && is_finite(x)) m.clean(rows, x, core());
     const PriorTerm term = core().analyse(gram(A_r), gram(A_t));
     if (term.projects) {
         A_t *= term.keep_t;
         A_r *= term.keep_r;
     }
-    const Pose x = to_pose(pose);
     if (!term.adds_prior || !is_finite(x)) return Status::kOk;
     const Vec3 e_r = log_so3(core().predicted.R.transpose() * x.R);
     m.copy_rows(make_prior_rows(term, e_r, x.t - core().predicted.t, variance));
@@ -133,9 +185,23 @@ Status Adapter::end_scan(const PoseView& posterior, bool converged, double* cova
     if (status == Status::kOk && core().degeneracy.inflate_only && covariance != nullptr) {
         status = impl_->remove_prior(covariance, size);
     }
+    impl_->gate.end_scan();
     impl_->gate.book().close(core().current);
     core().publish();
     return status;
+}
+
+void Adapter::reset() {
+    Plugin::reset();
+    impl_->gate.reset();
+    impl_->scans = impl_->rested = 0;
+}
+
+std::size_t Adapter::verdict_count() const { return impl_->gate.book().size(); }
+
+Verdict Adapter::verdict(std::size_t i) const {
+    const std::vector<Verdict>& verdicts = impl_->gate.book().verdicts();
+    return i < verdicts.size() ? verdicts[i] : Verdict::kFewNeighbours;
 }
 
 }  // namespace d2lio::fastlio

@@ -8,9 +8,22 @@ namespace d2lio::fastlio {
 
 using G = GateConstants;
 
-void Gate::begin_scan(std::size_t points) {
+void Gate::begin_scan(std::size_t points, const Vec3& sensor, bool patches) {
     book_.begin_scan(points);
     planes_.resize(points);
+    keeps_patches_ = patches;
+    if (!patches) return;
+    sensor_ = sensor.cast<float>();
+    patches_.resize(points);
+    points_.resize(points);
+}
+
+void Gate::end_scan() {
+    if (!keeps_patches_) return;
+    for (std::size_t i = 0; i < patches_.size(); ++i) {
+        if (book_.verdict(i) == Verdict::kAccepted) bends_.add(patches_[i]);
+    }
+    bends_.end_scan();
 }
 
 Verdict Gate::fit(const Candidate& c, const Rejector& rejector) {
@@ -35,7 +48,19 @@ Verdict Gate::fit(const Candidate& c, const Rejector& rejector) {
         case PlaneStatus::kOk:
             break;
     }
+    if (keeps_patches_) {
+        patches_[c.index] = make_patch(c.neighbours, static_cast<int>(c.neighbour_step),
+                                       G::kNeighbours, planes_[c.index].normal, sensor_);
+    }
     return Verdict::kAccepted;
+}
+
+/// Signed distance from the surface: from its plane, and from what its bend adds to that.
+float Gate::residual(std::size_t i, const Eigen::Vector3f& p) const {
+    const float distance = planes_[i].signed_distance(p);
+    if (!keeps_patches_) return distance;
+    const Patch& patch = patches_[i];
+    return distance - patch.side * bends_.at(patch.facing) * patch.sag(planes_[i].normal, p);
 }
 
 Verdict Gate::accept(const Candidate& c, const Rejector& rejector, Correspondence* out) {
@@ -49,13 +74,14 @@ Verdict Gate::accept(const Candidate& c, const Rejector& rejector, Correspondenc
 
     const Plane& plane = planes_[c.index];
     const Eigen::Vector3f p(c.p_map[0], c.p_map[1], c.p_map[2]);
-    const float residual = plane.signed_distance(p);
-    const double score = 1.0 - G::kResidualSlope * std::abs(static_cast<double>(residual)) /
+    const float distance = residual(c.index, p);
+    if (keeps_patches_) points_[c.index] = p;
+    const double score = 1.0 - G::kResidualSlope * std::abs(static_cast<double>(distance)) /
                                    std::sqrt(c.lidar_range);
-    const bool inside = rejector.host_gates() ? score > G::kResidualScore : std::isfinite(residual);
+    const bool inside = rejector.host_gates() ? score > G::kResidualScore : std::isfinite(distance);
     if (!inside) return verdict = Verdict::kResidual;
     Eigen::Map<Eigen::Vector3f>(out->normal) = plane.normal;
-    out->residual = residual;
+    out->residual = distance;
     return verdict;
 }
 

@@ -4,6 +4,8 @@
 
 #include <vector>
 
+#include "d2lio/degeneracy/bend.hpp"
+#include "d2lio/degeneracy/patch.hpp"
 #include "d2lio/fastlio/adapter.hpp"
 #include "d2lio/geometry/plane.hpp"
 #include "d2lio/plugin/verdict_book.hpp"
@@ -23,16 +25,30 @@ struct GateConstants {
 /// its own point, so any number of threads may call it.
 class Gate {
   public:
-    void begin_scan(std::size_t points);
+    /// @param sensor position, map frame. @param patches whether to look at the surfaces too.
+    void begin_scan(std::size_t points, const Vec3& sensor, bool patches);
     Verdict accept(const Candidate& candidate, const Rejector& rejector, Correspondence* out);
+    /// Learns from the surfaces that were accepted.
+    void end_scan();
+    void reset() { bends_.reset(); }
 
     VerdictBook& book() { return book_; }
+    /// Of an accepted point; only while patches are kept.
+    const Patch& patch(std::size_t i) const { return patches_[i]; }
+    const Eigen::Vector3f& point(std::size_t i) const { return points_[i]; }  ///< map frame
 
   private:
     Verdict fit(const Candidate& candidate, const Rejector& rejector);
 
+    float residual(std::size_t i, const Eigen::Vector3f& p) const;
+
     VerdictBook book_;
     std::vector<Plane> planes_;
+    bool keeps_patches_ = false;
+    Eigen::Vector3f sensor_ = Eigen::Vector3f::Zero();
+    std::vector<Patch> patches_;
+    std::vector<Eigen::Vector3f> points_;
+    BendField bends_;
 };
 
 }  // namespace d2lio::fastlio

@@ -3,7 +3,9 @@
 #include "d2lio/fastlio/host.hpp"
 
 #include "d2lio/fastlio/adapter.hpp"
+#include "d2lio/host/rest_place.hpp"
 #include "d2lio/host/stop_watch.hpp"
+#include "d2lio/imu/hold.hpp"
 #include "d2lio/preprocess/voxel_grid.hpp"
 #include "ieskf.hpp"
 #include "imu_processor.hpp"
@@ -42,7 +44,8 @@ IeskfOptions filter_options(const HostConfig& c) {
 class Host::Impl {
   public:
     Impl(const ParamMap& params, int threads)
-        : config_(load(params, threads, adapter_)),
+        : params_(params),
+          config_(load(params, threads, adapter_)),
           intake_(config_.intake),
           imu_(config_),
           map_(config_),
@@ -51,6 +54,7 @@ class Host::Impl {
 
     std::optional<ScanResult> step();
 
+    ParamMap params_;
     Adapter adapter_;
     HostConfig config_;
     Intake intake_;
@@ -60,6 +64,8 @@ class Host::Impl {
     ScanMatcher matcher_;
     VoxelGrid voxel_grid_{static_cast<float>(config_.filter_size_surf)};
     std::size_t resets_ = 0;
+    bool matched_ = false;                      ///< the last scan met the adapter
+    std::vector<Eigen::Vector3f> downsampled_;  ///< LiDAR frame at scan end
     NavState x_;
     Mat23x23 P_ = Mat23x23::Identity();
 
@@ -72,13 +78,18 @@ class Host::Impl {
     bool predict(MeasureGroup& group, ScanResult& r);
     void start_map(ScanResult& r);
     void update(const Pose& previous, ScanResult& r);
+    void hold(const NavState& predicted, const Mat23x23& P);
+    bool held() const { return adapter_.starts_at_rest() && imu_.resting(); }
+    void average_map(ScanResult& r);
     void grow_map(const MeasureGroup& group, ScanResult& r);
     void finish(ScanResult& r) const;
 
+    RestPlace rest_;
+    RestCloud rest_cloud_;  ///< map frame
     bool first_scan_ = true;
     int failures_ = 0;  ///< refused updates in a row
     Stamp first_begin_ = 0;
-    std::vector<Eigen::Vector3f> cloud_, downsampled_;
+    std::vector<Eigen::Vector3f> cloud_;
     StopWatch watch_;
 };
 
@@ -95,6 +106,7 @@ std::optional<ScanResult> Host::Impl::step() {
     std::optional<MeasureGroup> group = intake_.next(r);
     if (!group) return std::nullopt;
     StopWatch total;
+    matched_ = false;
     watch_.lap();
     process(*group, r);
     r.times.total = total.lap();
@@ -105,6 +117,7 @@ std::optional<ScanResult> Host::Impl::step() {
 void Host::Impl::process(MeasureGroup& group, ScanResult& r) {
     if (start_up(group, r)) return;
     const Pose previous = x_.T_map_imu();
+    if (adapter_.starts_at_rest()) imu_.watch_rest(group.imu);
     if (!predict(group, r)) return;
     map_.follow(x_.T_map_lidar().t);
     voxel_grid_.filter(cloud_, downsampled_);
@@ -121,6 +134,11 @@ void Host::Impl::process(MeasureGroup& group, ScanResult& r) {
         return;
     }
     update(previous, r);
+    if (held()) {
+        average_map(r);
+        return;
+    }
+    rest_cloud_.finish();
     if (r.status != ScanStatus::kNumericalFailure) grow_map(group, r);
 }
 
@@ -175,7 +193,9 @@ void Host::Impl::start_map(ScanResult& r) {
         r.has_pose = false;
         return;
     }
+    rest_.pose = x_.T_map_imu();
     matcher_.begin(downsampled_, map_.tree());
+    rest_cloud_.start(matcher_.to_map(x_));
     map_.build(matcher_.to_map(x_));
     r.status = ScanStatus::kMapInitialised;
     r.times.map = watch_.lap();
@@ -189,8 +209,12 @@ void Host::Impl::update(const Pose& previous, ScanResult& r) {
                           StateIndex::kSize,
                           StateIndex::kPos,
                           StateIndex::kRot,
-                          downsampled_.size()};
+                          downsampled_.size(),
+                          held()};
+    const NavState before = x_;
+    const Mat23x23 P_before = P_;
     adapter_.begin_scan(input);
+    matched_ = true;
     matcher_.begin(downsampled_, map_.tree());
     const UpdateReport report =
         ieskf_.update(x_, P_, [this](const NavState& x, bool search, Linearisation& out) {
@@ -203,8 +227,27 @@ void Host::Impl::update(const Pose& previous, ScanResult& r) {
     r.diagnostics = adapter_.diagnostics();
     r.diagnostics.iterations = report.iterations;
     judge(report.status, r);
+    if (held()) {
+        if (updated && rest_.left(x_.T_map_imu(), r.diagnostics)) imu_.end_rest();
+        if (held()) hold(before, P_before);
+    }
     r.times.search = matcher_.search_ms();
     r.times.update = watch_.lap() - r.times.search;
+}
+
+/// At rest the pose is that of the start and the velocity zero, which teaches the filter its biases
+/// and gravity; what the scan would say of the pose is only the noise of its match.
+void Host::Impl::hold(const NavState& predicted, const Mat23x23& P) {
+    x_ = predicted;
+    P_ = P;
+    hold_still(rest_.pose, x_, P_);
+}
+
+void Host::Impl::average_map(ScanResult& r) {
+    if (!rest_cloud_.add(matcher_.to_map(x_))) return;
+    map_.clear();
+    map_.build(rest_cloud_.mean(config_.filter_size_map));
+    r.times.map = watch_.lap();
 }
 
 void Host::Impl::judge(UpdateStatus status, ScanResult& r) {
@@ -262,6 +305,31 @@ PushStatus Host::add_imu(const ImuSample& sample) { return impl_->intake_.add_im
 PushStatus Host::add_scan(Scan scan) { return impl_->intake_.add_scan(std::move(scan)); }
 void Host::finish() { impl_->intake_.finish(); }
 std::optional<ScanResult> Host::step() { return impl_->step(); }
+void Host::reconfigure(const ParamMap& changes) {
+    Adapter scratch;
+    d2lio::reconfigure(changes, scratch, impl_->adapter_, impl_->params_);
+    if (!impl_->map_.empty()) impl_->imu_.end_rest();  // what began meanwhile was not watched
+}
+
+std::vector<Eigen::Vector3f> Host::scan_points() const {
+    std::vector<Eigen::Vector3f> out;
+    if (!impl_->matched_) return out;
+    const Pose T = impl_->x_.T_map_lidar();
+    for (const Eigen::Vector3f& p : impl_->downsampled_) {
+        out.push_back((T * p.cast<double>()).cast<float>());
+    }
+    return out;
+}
+
+std::vector<Verdict> Host::verdicts() const {
+    std::vector<Verdict> out;
+    if (!impl_->matched_) return out;
+    for (std::size_t i = 0; i < impl_->adapter_.verdict_count(); ++i) {
+        out.push_back(impl_->adapter_.verdict(i));
+    }
+    return out;
+}
+
 std::vector<Eigen::Vector3f> Host::map_points() const { return impl_->map_.tree().points(); }
 HostCounts Host::counts() const {
     return {impl_->intake_.sync_counts(), impl_->intake_.filter_counts(), impl_->resets_, {}};

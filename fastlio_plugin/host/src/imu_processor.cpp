@@ -2,29 +2,20 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "imu_processor.hpp"
 
+#include "d2lio/imu/hold.hpp"
+
 namespace d2lio::fastlio {
 namespace {
 
 constexpr double kGravity = 9.81;         ///< m/s^2, scale of the accelerometer at rest
 constexpr double kGravityLength = 9.809;  ///< m/s^2, length of the gravity state
 
-/// FAST-LIO2's initial covariance.
-Mat23x23 initial_covariance() {
-    using I = StateIndex;
-    Vec23 p = Vec23::Ones();
-    p.segment<3>(I::kExtrinsicRot).setConstant(1e-5);
-    p.segment<3>(I::kExtrinsicPos).setConstant(1e-5);
-    p.segment<3>(I::kGyroBias).setConstant(1e-4);
-    p.segment<3>(I::kAccelBias).setConstant(1e-3);
-    p.segment<2>(I::kGravity).setConstant(1e-5);
-    return p.asDiagonal();
-}
-
 }  // namespace
 
 ImuProcessor::ImuProcessor(const HostConfig& config)
     : extrinsic_(config.intake.extrinsic()),
-      Q_(config.noise.matrix()),
+      configured_Q_(config.noise.matrix()),
+      Q_(configured_Q_),
       exact_(config.exact_jacobians),
       start_(config.intake.init_samples) {}
 
@@ -32,6 +23,15 @@ void ImuProcessor::reset() {
     initialised_ = false;
     start_.reset();
     stepper_.reset();
+    rest_.reset();
+    Q_ = configured_Q_;
+}
+
+void ImuProcessor::watch_rest(const std::vector<ImuSample>& samples) {
+    if (!rest_.resting()) return;
+    rest_.add(samples);
+    if (!rest_.knows_noise()) return;
+    Q_ = rest_.noise(accel_scale_).matrix();
 }
 
 bool ImuProcessor::initialise(const std::vector<ImuSample>& samples, NavState& x, Mat23x23& P) {
@@ -42,8 +42,9 @@ bool ImuProcessor::initialise(const std::vector<ImuSample>& samples, NavState& x
     x.extrinsic_pos = extrinsic_.t;
     x.gyro_bias = start_.mean_gyro();
     x.gravity = -kGravityLength * start_.mean_accel().normalized();
-    P = initial_covariance();
-    stepper_.start(samples.back(), kGravity / start_.mean_accel().norm());
+    P = start_covariance();
+    accel_scale_ = kGravity / start_.mean_accel().norm();
+    stepper_.start(samples.back(), accel_scale_);
     initialised_ = true;
     return true;
 }

@@ -2,6 +2,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
+#include "d2lio/imu/rest.hpp"
 #include <string>
 #include <vector>
 
@@ -28,16 +29,23 @@ class ImuProcessor {
     const std::string& note() const { return start_.note(); }
     /// Mean period of the samples used so far, s; 0 before any.
     double mean_period() const { return stepper_.mean_period(); }
+    /// Learns whether the body rests, and from its rest the noise of both sensors (method
+    /// noise_aware); the configured noise holds until then.
+    void watch_rest(const std::vector<ImuSample>& samples);
+    bool resting() const { return rest_.resting(); }
+    void end_rest() { rest_.contradict(); }
     void reset();
 
   private:
     Pose extrinsic_;
-    Mat12 Q_;
+    Mat12 configured_Q_, Q_;
     bool exact_;
     bool initialised_ = false;
     ImuStart start_;
     ImuStepper stepper_;
     std::vector<MotionKnot> knots_;
+    RestDetector rest_;
+    double accel_scale_ = 1.0;  ///< readings to m/s^2
 };
 
 }  // namespace d2lio::fastlio

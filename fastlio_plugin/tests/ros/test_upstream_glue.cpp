@@ -112,6 +112,29 @@ TEST(UpstreamGlue, WithoutParametersLeavesEverythingToUpstream) {
     EXPECT_TRUE(node.advertised.empty());
 }
 
+/// The method must see every correspondence, so it decides even where rejection is off.
+TEST(UpstreamGlue, NoiseAwareDecidesWithRejectionOff) {
+    Node node;
+    test::set(node, "degeneracy/method", "noise_aware");
+    UpstreamGlue glue;
+    glue.configure(node, 0.5);
+    EXPECT_TRUE(glue.decides());
+    Filter kf;
+    Equations eq(50, 1e-3);
+    const Equations before = eq;
+    run_scan(glue, kf, eq);  // equations that were not offered point by point
+    EXPECT_EQ(eq.H, before.H);
+    EXPECT_EQ(eq.z, before.z);
+    EXPECT_EQ(kf.changes, 0);  // no prior, so nothing to take out of the covariance
+}
+
+TEST(UpstreamGlue, SharesThatDoNotFitTogetherAreRefused) {
+    Node node;
+    test::set(node, "degeneracy/method", "noise_aware");
+    test::set(node, "degeneracy/share_low", 1000.0);
+    EXPECT_NE(message_of(node).find("share_high"), std::string::npos) << message_of(node);
+}
+
 TEST(UpstreamGlue, YamlTruthValuesAreTakenForTheWordsTheyStandFor) {
     Node node;
     test::set(node, "rejection/mode", false);  // YAML reads a bare off as false

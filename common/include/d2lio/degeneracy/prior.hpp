@@ -5,11 +5,12 @@
 #include <variant>
 
 #include "d2lio/config/params.hpp"
+#include "d2lio/degeneracy/blind.hpp"
 #include "d2lio/degeneracy/policies.hpp"
 
 namespace d2lio {
 
-enum class DegeneracyMethod { kNone, kPaper, kRemap };
+enum class DegeneracyMethod { kNone, kPaper, kRemap, kNoiseAware };
 
 struct DegeneracyConfig {
     DegeneracyMethod method = DegeneracyMethod::kNone;
@@ -20,9 +21,15 @@ struct DegeneracyConfig {
     double threshold_r = 100.0;  ///< m^2, method remap
     double threshold_t = 100.0;  ///< points, method remap
     double weak_share = 0.03;    ///< of the trace; smaller eigenvalues are reported as weak
+    NoiseAwareConfig noise_aware;
+    bool rest = true;  ///< method noise_aware: hold the pose until the first motion
+
+    bool cleans_rows() const { return method == DegeneracyMethod::kNoiseAware; }
 
     /// Binds the keys `degeneracy.*`.
     void bind(ParamTable& table);
+    /// @throws ConfigError where parameters do not fit together.
+    void validate() const;
 };
 
 /// The policy chosen by a DegeneracyConfig.

@@ -54,7 +54,13 @@ struct ScanDiagnostics {
     Mat3 v_t = Mat3::Constant(kNaN);       ///< columns: translation directions, map frame
     Vec3 prior_r = Vec3::Zero();           ///< prior information along v_r, rad^-2
     Vec3 prior_t = Vec3::Zero();           ///< prior information along v_t, m^-2
-    int weak_r = 0, weak_t = 0;            ///< number of weak directions (the first columns)
+    /// Of each direction's translation information, what noise alone may have given, descending;
+    /// NaN but for method noise_aware.
+    Vec3 noise_share = Vec3::Constant(kNaN);
+    Mat3 noise_axes = Mat3::Identity();  ///< columns: the directions of noise_share, map frame
+    int blind = 0;               ///< number of directions in which rows had to prove themselves
+    int cleaned = 0;             ///< rows that lost a component there (last iteration)
+    int weak_r = 0, weak_t = 0;  ///< number of weak directions (the first columns)
     double correction_r = kNaN, correction_t = kNaN;  ///< |posterior - prediction|, rad and m
     double correction_weak_r = kNaN, correction_weak_t = kNaN;  ///< its part along weak directions
     int iterations = 0;

@@ -18,6 +18,13 @@ using ParamMap = std::map<std::string, std::string>;
 /// @throws ConfigError for a refused value, and for an unknown key with all known ones.
 void configure(const ParamMap& params, ParamTable& table, Plugin& adapter);
 
+/// Changes a running adapter's parameters. What its strategies have learnt is forgotten.
+/// @param scratch a fresh adapter, on which everything is tried before
+/// @param params of the host so far; takes up the changes
+/// @throws ConfigError for a refused value, and for a key that is not the adapter's; nothing has
+/// changed then.
+void reconfigure(const ParamMap& changes, Plugin& scratch, Plugin& adapter, ParamMap& params);
+
 /// @throws ConfigError unless 1 to 256.
 void check_threads(int threads);
 

@@ -44,6 +44,8 @@ struct Plugin::Core {
     Status begin(bool usable, const Pose& previous);
     /// Notes the spectrum of the accepted rows and the prior that follows from it.
     PriorTerm analyse(const Mat3& AtA_r, const Mat3& AtA_t);
+    /// Directions that noise may dominate, noted in the record (method noise_aware).
+    BlindDirections find_blind(const SurfaceSums& sums);
     /// Learns from the estimate. The scan stays open for the record until publish().
     Status end(const Pose& posterior, bool converged);
     /// Makes the current record the last one.

@@ -11,6 +11,9 @@
 namespace d2lio {
 
 struct ScanDiagnostics;
+struct NoiseAwareConfig;
+struct BlindDirections;
+struct SurfaceSums;
 
 /// What became of one scan point; every value but kAccepted is a reason for rejection.
 enum class Verdict : std::uint8_t {
@@ -60,8 +63,13 @@ class Plugin {
 
     /// True when a rejection mode other than off is set.
     bool rejects() const;
-    /// True when a degeneracy method other than none is set.
+    /// True when the degeneracy method adds a prior or projects (paper, remap).
     bool has_prior() const;
+    /// True when the method must see every correspondence, whatever the rejection mode
+    /// (noise_aware).
+    bool reads_surfaces() const;
+    /// True when the host should hold the pose until the first motion (method noise_aware).
+    bool starts_at_rest() const;
     /// Forgets everything learnt from scans; parameters stay.
     void reset();
 
@@ -71,6 +79,11 @@ class Plugin {
     double diagnostics_value(std::size_t i) const;
     /// The same as a struct, for hosts built together with this library.
     const ScanDiagnostics& diagnostics() const;
+    /// For hosts that keep the rows themselves, in a scan (method noise_aware): parameters, and
+    /// what the sums over the rows say; `cleaned` rows go on record.
+    const NoiseAwareConfig& noise_aware() const;
+    BlindDirections find_blind(const SurfaceSums& sums);
+    void note_cleaned(int rows);
 
   protected:
     struct Core;  ///< d2lio/plugin/core.hpp

@@ -17,6 +17,7 @@ class VerdictBook {
     void begin_scan(std::size_t points);
     std::size_t size() const { return verdicts_.size(); }
     Verdict& verdict(std::size_t i) { return verdicts_[i]; }
+    const std::vector<Verdict>& verdicts() const { return verdicts_; }
     void set_threshold(std::size_t i, double threshold) {
         thresholds_[i] = static_cast<float>(threshold);
     }

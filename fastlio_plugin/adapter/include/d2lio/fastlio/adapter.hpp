@@ -25,6 +25,7 @@ struct ScanInput {
     int position_index;        ///< first row of the position block; FAST-LIO2: 0
     int rotation_index;        ///< first row of the rotation block (right tangent); FAST-LIO2: 3
     std::size_t points;        ///< scan points to be offered
+    bool at_rest = false;      ///< the host holds the pose: rows are only looked at
 };
 
 struct Candidate {
@@ -53,6 +54,7 @@ struct Rows {
     int count;
     std::ptrdiff_t row_step, column_step;
     int position_column, rotation_column;
+    int extrinsic_column = -1;  ///< first of the six of T_imu_lidar, -1 if the host has none
 };
 
 /// Rows to append to the host's: at most 6. Columns 0-2 position, 3-5 rotation.
@@ -77,6 +79,12 @@ class Adapter : public Plugin {
     /// @param covariance posterior, corrected in place so that it does not claim the prior's
     /// information (degeneracy.inflate_only); may be null.
     Status end_scan(const PoseView& posterior, bool converged, double* covariance, int size);
+    /// Plugin::reset(), and what was learnt of the surfaces.
+    void reset();
+
+    /// What became of the last scan's points, in their order.
+    std::size_t verdict_count() const;
+    Verdict verdict(std::size_t i) const;  ///< kFewNeighbours past the end
 
   private:
     struct Impl;

@@ -34,7 +34,7 @@ class UpstreamGlue {
         adapter_.set_map_voxel(map_voxel);
         recorder_.open_csv(csv, settings);
         settings.finish(adapter_, {"upstream_fixes", "diagnostics.csv", "diagnostics.topic"});
-        changes_ = adapter_.rejects() || adapter_.has_prior();
+        changes_ = adapter_.rejects() || adapter_.has_prior() || adapter_.reads_surfaces();
         if (topic == "-") topic = changes_ ? "d2lio/diagnostics" : "";
         recorder_.advertise(node, topic, "fast_lio");
     }
@@ -55,11 +55,11 @@ class UpstreamGlue {
         rows_ = 0;
         adapter_.begin_scan({previous_.view(), predicted.view(), P.data(),
                              static_cast<int>(P.rows()), kPosition, kRotation,
-                             static_cast<std::size_t>(points > 0 ? points : 0)});
+                             static_cast<std::size_t>(points > 0 ? points : 0), false});
     }
 
     /// Whether accept() decides; otherwise upstream's own gates do.
-    bool decides() const { return adapter_.rejects(); }
+    bool decides() const { return adapter_.rejects() || adapter_.reads_surfaces(); }
 
     /// @param fresh the neighbours come from a new search; only then are `sq_distances` read.
     /// @param plane on acceptance gets the unit normal in x, y, z and the signed distance (m) in
@@ -101,7 +101,8 @@ class UpstreamGlue {
         last_ = here;
         PriorBlock prior;
         adapter_.condition(
-            {H.data(), z.data(), rows_, H.rowStride(), H.colStride(), kPosition, kRotation},
+            {H.data(), z.data(), rows_, H.rowStride(), H.colStride(), kPosition, kRotation,
+             kExtrinsic},
             here.view(), variance, &prior);
         if (prior.count == 0) return;
         H.conservativeResize(rows_ + prior.count, H.cols());
@@ -150,7 +151,7 @@ class UpstreamGlue {
     }
 
   private:
-    static constexpr int kPosition = 0, kRotation = 3;  ///< FAST-LIO2's order of the state
+    static constexpr int kPosition = 0, kRotation = 3, kExtrinsic = 6;  ///< FAST-LIO2's order of the state
     static constexpr double kConverged = 0.001;         ///< upstream's limit, m and rad
 
     struct PoseCopy {

@@ -1,0 +1,32 @@
+// SPDX-FileCopyrightText: 2026 D2-LIO contributors
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <array>
+
+#include "d2lio/degeneracy/patch.hpp"
+
+namespace d2lio {
+
+/// Mean curvature of what the sensor sees, by the direction the surface faces (1/m, positive where
+/// it bends towards the sensor, as the vault of a tunnel does).
+///
+/// A plane through points of a bent surface cuts it: the points between its supports lie beyond it.
+/// In a tunnel with a flat road that pushes the pose down scan after scan, and the map with it,
+/// until the pitch is wrong by milliradians. One patch of five points cannot tell a bend from noise;
+/// all patches that face the same way can. What is not significant (two sigma) counts as flat.
+class BendField {
+  public:
+    /// Bend of a facing as learnt from earlier scans.
+    float at(int facing) const { return bend_[static_cast<std::size_t>(facing)]; }
+    void add(const Patch& patch);
+    /// Closes a scan: older ones fade with a time constant of ten scans.
+    void end_scan();
+    void reset() { *this = BendField(); }
+
+  private:
+    std::array<double, kFacings> rise_{}, run_{};
+    std::array<float, kFacings> bend_{};
+};
+
+}  // namespace d2lio

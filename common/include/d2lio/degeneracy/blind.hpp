@@ -1,0 +1,59 @@
+// SPDX-FileCopyrightText: 2026 D2-LIO contributors
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include "d2lio/degeneracy/noise_share.hpp"
+#include "d2lio/degeneracy/patch.hpp"
+
+namespace d2lio {
+
+/// Parameters of method noise_aware.
+struct NoiseAwareConfig {
+    double share_low = 0.15;    ///< of noise in a direction's information: below, nothing is done
+    double share_high = 0.3;    ///< above, every row has to prove itself
+    double significance = 6.0;  ///< sigmas by which a row's component must exceed its noise
+};
+
+/// Directions of translation that noise may dominate, and how far the rows are to be cleaned there.
+struct BlindDirections {
+    int count = 0;
+    Mat3 axes = Mat3::Identity();  ///< columns, map frame, orthonormal; the first `count` matter
+    Vec3 blend = Vec3::Zero();     ///< 0: leave the rows alone, 1: clean them
+};
+
+/// Sums over the accepted rows; see noise_share().
+struct SurfaceSums {
+    Mat3 information = Mat3::Zero();  ///< of n n^T
+    Mat3 noise = Mat3::Zero();        ///< of the covariances of the normals
+
+    void add(const Vec3& normal, const Patch& patch);
+};
+
+/// Finds the directions to clean.
+///
+/// The axis of a blind direction is taken from the filter, not from the scan, where both agree (to
+/// 15 degrees): the scan's own axis wobbles by a degree from scan to scan, and a direction that is
+/// cleaned along one axis and long uncertain along another would be measured by the difference,
+/// with the certainty of the well-seen directions. Along the long axis of P nothing leaks.
+/// @param P_t covariance of the predicted position, map frame, m^2.
+BlindDirections find_blind(const NoiseShare& share, const Mat3& P_t,
+                           const NoiseAwareConfig& config);
+
+/// A row after cleaning.
+struct CleanedRow {
+    Vec3 normal;          ///< map frame, not of unit length where a component went
+    double weight = 1.0;  ///< of the whole row, normal and residual
+};
+
+/// The row without what noise may have put into it: along each blind direction the component of its
+/// normal goes unless it exceeds its own uncertainty by config.significance sigmas. The residual
+/// stays as it is: at the point of linearisation the neighbours lie beside the point, wherever that
+/// is along the blind direction.
+///
+/// What proves itself gets half the weight, down from a component of about 0.05 on: a blind
+/// direction hangs on a few surfaces that scan after scan sees again, with the same error each
+/// time.
+CleanedRow cleaned_row(const Vec3& normal, const Patch& patch, const BlindDirections& blind,
+                       const NoiseAwareConfig& config);
+
+}  // namespace d2lio

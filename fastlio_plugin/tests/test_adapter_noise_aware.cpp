@@ -1,0 +1,367 @@
+// SPDX-FileCopyrightText: 2026 D2-LIO contributors
+// SPDX-License-Identifier: BSD-3-Clause
+#include <gtest/gtest.h>
+
+#include <Eigen/Geometry>
+#include <array>
+#include <cmath>
+#include <string>
+#include <vector>
+
+#include "d2lio/diagnostics/scan_diagnostics.hpp"
+#include "d2lio/fastlio/adapter.hpp"
+#include "random_state.hpp"
+
+namespace d2lio::fastlio {
+namespace {
+
+constexpr double kVariance = 0.001;
+constexpr double kExact = 1e-12;
+constexpr double kMapNoise = 0.02;  // m
+constexpr int kSettling = 20;       // scans that a filter which did not begin at rest gets whole
+constexpr int kResting = 5;         // scans of rest that do as well
+
+using RowMatrix = Eigen::Matrix<double, Eigen::Dynamic, 12, Eigen::RowMajor>;
+
+/// A point on a surface and its five neighbours in the map.
+struct Target {
+    Vec3 origin, u, v;  ///< u, v span the surface
+    double bend = 0.0;  ///< 1/m, along u, towards u x v
+    std::array<float, 15> neighbours{};
+    std::array<float, 3> p{};
+
+    Vec3 at(double a, double b) const {
+        return origin + a * u + b * v + 0.5 * bend * a * a * u.cross(v);
+    }
+    void fill(test::Random& random, double noise) {
+        constexpr double kPlaces[5][2] = {
+            {-0.25, -0.2}, {0.2, -0.25}, {0.25, 0.2}, {-0.2, 0.25}, {0, 0}};
+        const auto put = [](const Vec3& w, float* to) {
+            for (int k = 0; k < 3; ++k) to[k] = static_cast<float>(w[k]);
+        };
+        for (std::size_t i = 0; i < 5; ++i) {
+            put(at(kPlaces[i][0], kPlaces[i][1]) + noise * random.normal() * u.cross(v),
+                &neighbours[3 * i]);
+        }
+        put(at(0.05, 0.05), p.data());
+    }
+    Candidate candidate(std::size_t index) const {
+        static const std::array<float, 5> kNear{0.01F, 0.02F, 0.03F, 0.04F, 0.05F};
+        Candidate c{};
+        c.index = index;
+        c.fresh = true;
+        c.imu_range = c.lidar_range = 5.0;
+        c.p_map = p.data();
+        c.neighbours = neighbours.data();
+        c.sq_distances = kNear.data();
+        c.neighbour_step = 3;
+        c.distance_step = 1;
+        c.neighbour_count = 5;
+        return c;
+    }
+};
+
+/// A bare tunnel along x around the sensor, with `faces` walls across it.
+struct Tunnel {
+    Pose pose{exp_so3(Vec3(0.1, -0.2, 0.4)), Vec3(1.0, 0.3, -0.2)};
+    Mat23x23 P = 1e-4 * Mat23x23::Identity();
+    std::vector<Target> targets;
+    std::size_t faces;
+
+    explicit Tunnel(std::size_t faces_, unsigned seed = 1, double noise = kMapNoise,
+                    double bend = 0.0, const Vec3& centre = Vec3::Zero())
+        : faces(faces_) {
+        pose.t += centre;
+        P(0, 0) = 1e-2;  // long along the tunnel
+        test::Random random(seed);
+        for (std::size_t i = 0; i < faces; ++i) {
+            targets.push_back({Vec3(6.0, random.uniform(-2, 2), random.uniform(-2, 2)),
+                               Vec3::UnitY(), Vec3::UnitZ()});
+        }
+        while (targets.size() < 600) {
+            const double angle = random.uniform(0.0, 6.283);
+            const Vec3 inward(0.0, -std::cos(angle), -std::sin(angle));
+            const Vec3 u = Vec3::UnitX().cross(inward);
+            targets.push_back(
+                {Vec3(random.uniform(-8, 8), 0.0, 0.0) - 3.0 * inward, u, inward.cross(u), bend});
+        }
+        for (Target& t : targets) {
+            t.origin += centre;
+            t.fill(random, noise);
+        }
+    }
+    PoseView view() const { return {pose.R.data(), pose.t.data()}; }
+    ScanInput input(bool at_rest = false) const {
+        return {view(), view(), P.data(), 23, 0, 3, targets.size(), at_rest};
+    }
+};
+
+/// The rows a host makes of what the adapter accepts, before and after conditioning.
+struct Solved {
+    RowMatrix before, after;
+    Eigen::VectorXd residual, residual_after;
+    std::vector<Vec3> points;  ///< map frame
+    ScanDiagnostics told;
+
+    bool touched() const { return before != after || residual != residual_after; }
+};
+
+Solved solve(Adapter& adapter, const Tunnel& t, bool at_rest = false, int extrinsic = 6) {
+    Solved s;
+    EXPECT_EQ(adapter.begin_scan(t.input(at_rest)), Status::kOk);
+    std::vector<Correspondence> matches;
+    for (std::size_t i = 0; i < t.targets.size(); ++i) {
+        Correspondence m{};
+        if (adapter.accept(t.targets[i].candidate(i), &m) != Verdict::kAccepted) continue;
+        matches.push_back(m);
+        s.points.push_back(Eigen::Map<const Eigen::Vector3f>(t.targets[i].p.data()).cast<double>());
+    }
+    const auto n = static_cast<Eigen::Index>(matches.size());
+    s.before.resize(n, 12);
+    s.residual.resize(n);
+    for (Eigen::Index k = 0; k < n; ++k) {
+        const auto i = static_cast<std::size_t>(k);
+        const Vec3 normal = Eigen::Map<const Eigen::Vector3f>(matches[i].normal).cast<double>();
+        const Vec3 c = t.pose.R.transpose() * normal;
+        const Vec3 p_imu = t.pose.R.transpose() * (s.points[i] - t.pose.t);
+        s.before.row(k) << normal.transpose(), p_imu.cross(c).transpose(),
+            Vec3(1, 2, 3).transpose(), c.transpose();
+        s.residual[k] = -static_cast<double>(matches[i].residual);
+    }
+    s.after = s.before;
+    s.residual_after = s.residual;
+    PriorBlock prior{};
+    EXPECT_EQ(adapter.condition({s.after.data(), s.residual_after.data(), static_cast<int>(n), 12,
+                                 1, 0, 3, extrinsic},
+                                t.view(), kVariance, &prior),
+              Status::kOk);
+    EXPECT_EQ(prior.count, 0);
+    EXPECT_EQ(adapter.end_scan(t.view(), true, nullptr, 0), Status::kOk);
+    s.told = adapter.diagnostics();
+    return s;
+}
+
+/// Scans that see nothing, so that nothing is learnt but the time.
+void pass_scans(Adapter& adapter, int scans, bool at_rest = false) {
+    Tunnel empty(0);
+    for (int i = 0; i < scans; ++i) {
+        adapter.begin_scan(empty.input(at_rest));
+        adapter.end_scan(empty.view(), true, nullptr, 0);
+    }
+}
+
+Adapter& noise_aware(Adapter& adapter, int scans = kSettling) {
+    EXPECT_TRUE(adapter.set("degeneracy.method", "noise_aware"));
+    EXPECT_TRUE(adapter.check());
+    pass_scans(adapter, scans);
+    return adapter;
+}
+
+TEST(NoiseAware, ReadsSurfacesAndAddsNoPrior) {
+    Adapter a;
+    EXPECT_FALSE(a.reads_surfaces() || a.starts_at_rest());
+    noise_aware(a, 0);
+    EXPECT_TRUE(a.reads_surfaces() && a.starts_at_rest());
+    EXPECT_FALSE(a.has_prior());
+    ASSERT_TRUE(a.set("degeneracy.rest", "false"));
+    EXPECT_FALSE(a.starts_at_rest());
+    EXPECT_TRUE(a.reads_surfaces());
+}
+
+TEST(NoiseAware, ABareTunnelLosesItsAxis) {
+    Adapter a;
+    const Solved s = solve(noise_aware(a), Tunnel(0));
+    ASSERT_GT(s.after.rows(), 500);
+    EXPECT_GT(s.before.col(0).norm(), 0.5);  // noise has put as much as that into the rows
+    EXPECT_LT(s.after.col(0).norm(), 1e-9);
+    EXPECT_EQ(s.told.blind, 1);
+    EXPECT_GT(s.told.noise_share[0], 0.5);
+    EXPECT_LT(s.told.noise_share[1], 0.1);
+    EXPECT_EQ(s.told.cleaned, s.after.rows());
+    EXPECT_LT((s.after.middleCols<2>(1) - s.before.middleCols<2>(1)).norm(), kExact);
+    EXPECT_EQ(s.residual_after, s.residual);  // the points lie beside their neighbours as before
+}
+
+TEST(NoiseAware, AFaceAcrossTheTunnelKeepsIt) {
+    Adapter a;
+    const Solved s = solve(noise_aware(a), Tunnel(1));
+    ASSERT_EQ(s.told.blind, 1);
+    EXPECT_GT(std::abs(s.before(0, 0)), 0.98);
+    const double weight = s.after(0, 0) / s.before(0, 0);
+    EXPECT_NEAR(weight, 0.5, 0.01);  // half, but whole in all its parts
+    EXPECT_LT((s.after.row(0).head<6>() - weight * s.before.row(0).head<6>()).norm(), 1e-5);
+    EXPECT_NEAR(s.residual_after[0], weight * s.residual[0], kExact);
+    EXPECT_LT(s.after.bottomRows(s.after.rows() - 1).col(0).norm(), 1e-9);
+}
+
+TEST(NoiseAware, ManyFacesMakeItSeeing) {
+    Adapter a;
+    const Solved s = solve(noise_aware(a), Tunnel(30));
+    EXPECT_EQ(s.told.blind, 0);
+    EXPECT_EQ(s.told.cleaned, 0);
+    EXPECT_LT(s.told.noise_share[0], 0.3);
+    EXPECT_FALSE(s.touched());
+}
+
+TEST(NoiseAware, RotationFollowsTheCleanedNormal) {
+    Adapter a;
+    const Tunnel t(0);
+    const Solved s = solve(noise_aware(a), t);
+    for (Eigen::Index k = 0; k < s.after.rows(); ++k) {
+        const Vec3 n = s.after.row(k).head<3>();
+        const Vec3 p_imu =
+            t.pose.R.transpose() * (s.points[static_cast<std::size_t>(k)] - t.pose.t);
+        const Vec3 expected = p_imu.cross(t.pose.R.transpose() * n);
+        ASSERT_LT((Vec3(s.after.row(k).segment<3>(3)) - expected).norm(), 1e-5) << k;
+    }
+    EXPECT_GT((s.after.middleCols<3>(3) - s.before.middleCols<3>(3)).norm(), 0.5);
+}
+
+TEST(NoiseAware, CleanedRowsTeachTheExtrinsicNothing) {
+    Adapter a, b;
+    const Solved s = solve(noise_aware(a), Tunnel(0));
+    EXPECT_GT(s.before.rightCols<6>().norm(), 1.0);
+    EXPECT_EQ(s.after.rightCols<6>().norm(), 0.0);
+    const Solved none =
+        solve(noise_aware(b), Tunnel(0), false, -1);  // a host without those columns
+    EXPECT_EQ(none.after.rightCols<6>(), none.before.rightCols<6>());
+    EXPECT_EQ(none.after.leftCols<6>(), s.after.leftCols<6>());
+}
+
+TEST(NoiseAware, RowsInColumnsGiveTheSame) {
+    Adapter a, b;
+    const Tunnel t(1);
+    const Solved rows = solve(noise_aware(a), t);
+    noise_aware(b);
+    b.begin_scan(t.input());
+    Correspondence m{};
+    for (std::size_t i = 0; i < t.targets.size(); ++i) b.accept(t.targets[i].candidate(i), &m);
+    Eigen::Matrix<double, Eigen::Dynamic, 12> columns = rows.before;
+    Eigen::VectorXd r = rows.residual;
+    PriorBlock prior{};
+    const auto n = static_cast<int>(columns.rows());
+    b.condition({columns.data(), r.data(), n, 1, n, 0, 3, 6}, t.view(), kVariance, &prior);
+    EXPECT_EQ(RowMatrix(columns), rows.after);
+    EXPECT_EQ(r, rows.residual_after);
+}
+
+TEST(NoiseAware, RowsOfSomebodyElseAreLeftAlone) {
+    Adapter a;
+    const Tunnel t(0);
+    const Solved s = solve(noise_aware(a), t);
+    RowMatrix H = s.before.topRows(300);
+    Eigen::VectorXd r = s.residual.head(300);
+    PriorBlock prior{};
+    for (const bool offered : {false, true}) {  // nothing was offered here, or more than these
+        ASSERT_EQ(a.begin_scan(t.input()), Status::kOk);
+        Correspondence m{};
+        for (std::size_t i = 0; offered && i < t.targets.size(); ++i) {
+            a.accept(t.targets[i].candidate(i), &m);
+        }
+        EXPECT_EQ(
+            a.condition({H.data(), r.data(), 300, 12, 1, 0, 3, 6}, t.view(), kVariance, &prior),
+            Status::kOk);
+        EXPECT_EQ(H, s.before.topRows(300));
+        EXPECT_EQ(r, s.residual.head(300));
+        a.end_scan(t.view(), true, nullptr, 0);
+        EXPECT_EQ(a.diagnostics().cleaned, 0);
+        EXPECT_TRUE(std::isnan(a.diagnostics().noise_share[0]));
+    }
+}
+
+TEST(NoiseAware, AtRestRowsAreOnlyLookedAt) {
+    Adapter a;
+    const Solved s = solve(noise_aware(a), Tunnel(0), true);
+    EXPECT_FALSE(s.touched());
+    EXPECT_EQ(s.told.blind, 1);  // but told
+    EXPECT_EQ(s.told.cleaned, 0);
+}
+
+TEST(NoiseAware, AFilterThatDidNotBeginAtRestGetsItsFirstScansWhole) {
+    Adapter a;
+    noise_aware(a, kSettling - 1);
+    EXPECT_FALSE(solve(a, Tunnel(0)).touched());
+    EXPECT_TRUE(solve(a, Tunnel(0)).touched());
+}
+
+TEST(NoiseAware, AfterARestItActsFromTheFirstMotionOn) {
+    Adapter a, b;
+    noise_aware(a, 0);
+    pass_scans(a, kResting + 1, true);
+    EXPECT_TRUE(solve(a, Tunnel(0)).touched());
+    noise_aware(b, 0);
+    pass_scans(b, kResting, true);
+    EXPECT_FALSE(solve(b, Tunnel(0)).touched());
+}
+
+TEST(NoiseAware, ResetSettlesAnew) {
+    Adapter a;
+    ASSERT_TRUE(solve(noise_aware(a), Tunnel(0)).touched());
+    a.reset();
+    EXPECT_TRUE(a.reads_surfaces());
+    EXPECT_FALSE(solve(a, Tunnel(0)).touched());
+    Adapter b;
+    noise_aware(b, 0);
+    pass_scans(b, kResting + 1, true);
+    b.reset();
+    EXPECT_FALSE(solve(b, Tunnel(0)).touched());
+}
+
+/// In a vault the planes cut the surface; what is learnt of its bend puts the points back on it.
+TEST(NoiseAware, LearnsTheBendOfAVaultAndResetForgetsIt) {
+    // Fitted normals look at the map's origin: from far off half of them look away from the sensor.
+    for (const Vec3& centre : {Vec3(0.0, 0.0, 0.0), Vec3(0.0, 20.0, 5.0)}) {
+        Adapter a;
+        noise_aware(a);
+        const Tunnel vault(0, 3, 0.0, 1.0 / 3.0, centre);
+        const double flat = solve(a, vault).residual.cwiseAbs().mean();
+        EXPECT_GT(flat, 3e-3);
+        for (int i = 0; i < 5; ++i) solve(a, vault);
+        const double bent = solve(a, vault).residual.cwiseAbs().mean();
+        EXPECT_LT(bent, 0.4 * flat);
+        a.reset();
+        EXPECT_EQ(solve(a, vault).residual.cwiseAbs().mean(), flat);
+    }
+}
+
+TEST(NoiseAware, OtherMethodsMeasurePlainDistancesAndTouchNoRow) {
+    Adapter plain;
+    const Tunnel vault(0, 3, 0.0, 1.0 / 3.0);
+    pass_scans(plain, kSettling);
+    const Solved first = solve(plain, vault), last = solve(plain, vault);
+    EXPECT_EQ(first.residual, last.residual);
+    EXPECT_FALSE(last.touched());
+    EXPECT_TRUE(std::isnan(last.told.noise_share[0]));
+}
+
+TEST(NoiseAware, SharesThatDoNotFitTogetherAreRefused) {
+    Adapter a;
+    EXPECT_TRUE(a.check());
+    ASSERT_TRUE(a.set("degeneracy.share_low", "0.3"));
+    for (const char* high : {"0.3", "0.2"}) {
+        ASSERT_TRUE(a.set("degeneracy.share_high", high));
+        EXPECT_FALSE(a.check());
+        EXPECT_NE(std::string(a.error()).find("degeneracy.share_high"), std::string::npos);
+        EXPECT_NE(std::string(a.error()).find("degeneracy.share_low"), std::string::npos);
+    }
+    ASSERT_TRUE(a.set("degeneracy.share_low", "0.1"));
+    EXPECT_TRUE(a.check());
+    for (const char* key :
+         {"degeneracy.share_low", "degeneracy.share_high", "degeneracy.significance"}) {
+        EXPECT_FALSE(a.set(key, "-1")) << key;
+        EXPECT_FALSE(a.set(key, "nan")) << key;
+    }
+}
+
+TEST(NoiseAware, ParametersReachTheMethod) {
+    Adapter strict;
+    ASSERT_TRUE(strict.set("degeneracy.significance", "500"));
+    EXPECT_NEAR(solve(noise_aware(strict), Tunnel(1)).after(0, 0), 0.0, 1e-9);
+    Adapter a;
+    a.set("degeneracy.share_high", "1000");
+    a.set("degeneracy.share_low", "900");
+    EXPECT_FALSE(solve(noise_aware(a), Tunnel(0)).touched());
+}
+
+}  // namespace
+}  // namespace d2lio::fastlio
