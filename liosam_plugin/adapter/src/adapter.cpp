@@ -193,4 +193,11 @@ Status Adapter::end_scan(const PoseView& estimate, bool converged) {
     return status;
 }
 
+std::size_t Adapter::verdict_count() const { return impl_->book.size(); }
+
+Verdict Adapter::verdict(std::size_t i) const {
+    const std::vector<Verdict>& verdicts = impl_->book.verdicts();
+    return i < verdicts.size() ? verdicts[i] : Verdict::kFewNeighbours;
+}
+
 }  // namespace d2lio::liosam

@@ -2,22 +2,15 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "d2lio/liosam/host.hpp"
 
-#include <algorithm>
-
-#include "config.hpp"
 #include "correction.hpp"
-#include "d2lio/host/stop_watch.hpp"
 #include "d2lio/preprocess/deskew.hpp"
-#include "front_end.hpp"
-#include "keyframe_graph.hpp"
-#include "predictor.hpp"
+#include "host_impl.hpp"
 
 namespace d2lio::liosam {
 namespace {
 
-constexpr int kStartScans = 5;               ///< processed whatever the mapping interval
-constexpr double kLeastLoopVariance = 1e-6;  ///< rad^2 and m^2
-constexpr int kMaxFailures = 10;             ///< refused matches in a row before starting anew
+constexpr int kStartScans = 5;    ///< processed whatever the mapping interval
+constexpr int kMaxFailures = 10;  ///< refused matches in a row before starting anew
 
 HostConfig load(Preset preset, const ParamMap& params, int threads, Adapter& adapter) {
     HostConfig config(preset);
@@ -33,71 +26,24 @@ HostConfig load(Preset preset, const ParamMap& params, int threads, Adapter& ada
 
 }  // namespace
 
-class Host::Impl {
-  public:
-    Impl(Preset preset, const ParamMap& params, int threads)
-        : config_(load(preset, params, threads, adapter_)),
-          intake_(config_.intake),
-          predictor_(config_),
-          features_(config_.projection, config_.feature_options(),
-                    static_cast<float>(config_.corner_leaf),
-                    static_cast<float>(config_.surface_leaf)),
-          direct_(static_cast<float>(config_.direct_leaf)),
-          matcher_(adapter_, config_.match_options(), config_.threads),
-          map_(config_.submap_options()),
-          imu_graph_(config_.imu),
-          loops_(config_.loop, config_.threads) {}
-
-    std::optional<ScanResult> step();
-    HostCounts counts() const;
-
-    Adapter adapter_;
-    HostConfig config_;
-    Intake intake_;
-    Predictor predictor_;
-    FeatureFrontEnd features_;
-    DirectFrontEnd direct_;
-    ScanToMap matcher_;
-    KeyframeMap map_;
-    KeyframeGraph keyframes_;
-    ImuGraph imu_graph_;
-    LoopCloser loops_;
-
-  private:
-    void process(MeasureGroup& group, ScanResult& r);
-    bool start_up(const MeasureGroup& group, ScanResult& r);
-    bool predict(const MeasureGroup& group, ScanResult& r);
-    bool due(const MeasureGroup& group) const;
-    void prepare(MeasureGroup& group, ScanResult& r);
-    void start_map(const MeasureGroup& group, ScanResult& r);
-    bool enough_features() const;
-    Pose match(ScanResult& r);
-    bool matched() const { return report_.status == MatchStatus::kOk; }
-    void judge(const MatchReport& report, ScanResult& r);
-    void correct(const Pose& estimate, ScanResult& r);
-    void grow_map(const MeasureGroup& group, ScanResult& r);
-    void close_loop(ScanResult& r);
-    void begin_epoch();
-    void start_anew(const std::string& why, ScanResult& r);
-    void finish(ScanResult& r) const;
-
-    MatchCloud cloud_;
-    std::vector<LidarPoint> raw_;
-    Pose previous_;         ///< last estimate, T_map_imu
-    Pose loop_correction_;  ///< of all loops: T_map_odometry; the inertial graph lives in odometry
-    std::optional<Stamp> last_processed_;
-    MatchReport report_;
-    int processed_ = 0;              ///< scans since the start
-    int failures_ = 0;               ///< refused matches in a row
-    Health health_ = Health::kInit;  ///< of the last scan that was not skipped
-    std::size_t resets_ = 0, degenerate_ = 0, lost_ = 0, graph_events_ = 0, loops_closed_ = 0;
-    Mat6 covariance_ = Mat6::Zero();  ///< of the last estimate: rotation (body), position (map)
-    Mat6 matched_covariance_ = Mat6::Zero();  ///< of the last one that came from a match
-    StopWatch watch_;
-};
+Host::Impl::Impl(Preset preset, const ParamMap& params, int threads)
+    : params_(adapter_defaults(preset)),
+      config_(load(preset, params, threads, adapter_)),
+      intake_(config_.intake),
+      predictor_(config_),
+      features_(config_.projection, config_.feature_options(),
+                static_cast<float>(config_.corner_leaf), static_cast<float>(config_.surface_leaf)),
+      direct_(static_cast<float>(config_.direct_leaf)),
+      matcher_(adapter_, config_.match_options(), config_.threads),
+      map_(config_.submap_options()),
+      imu_graph_(config_.imu),
+      loops_(config_.loop, config_.threads) {
+    for (const auto& [key, value] : params) params_[key] = value;
+}
 
 void Host::Impl::begin_epoch() {
     predictor_.reset();
+    matcher_.reset();
     map_.clear();
     keyframes_.clear();
     imu_graph_.clear();
@@ -124,6 +70,7 @@ std::optional<ScanResult> Host::Impl::step() {
     std::optional<MeasureGroup> group = intake_.next(r);
     if (!group) return std::nullopt;
     StopWatch total;
+    judged_ = false;
     watch_.lap();
     process(*group, r);
     r.times.total = total.lap();
@@ -133,6 +80,7 @@ std::optional<ScanResult> Host::Impl::step() {
 
 void Host::Impl::process(MeasureGroup& group, ScanResult& r) {
     if (start_up(group, r)) return;
+    if (adapter_.starts_at_rest()) predictor_.watch_rest(group.imu);
     if (!predict(group, r)) return;
     if (!due(group)) {
         r.status = ScanStatus::kSkipped;
@@ -146,8 +94,17 @@ void Host::Impl::process(MeasureGroup& group, ScanResult& r) {
         return;
     }
     r.has_pose = true;
+    const bool held = filters() && adapter_.starts_at_rest() && predictor_.resting();
+    matcher_.set_resting(held);
     const Pose estimate = match(r);
-    correct(estimate, r);
+    if (filters()) {
+        if (fuse(estimate, held, r)) {
+            average_map(group, r);
+            return;
+        }
+    } else {
+        correct(estimate, r);
+    }
     if (r.status != ScanStatus::kNumericalFailure) grow_map(group, r);
 }
 
@@ -220,6 +177,18 @@ void Host::Impl::start_map(const MeasureGroup& group, ScanResult& r) {
     }
     const NavState& x = predictor_.state();
     previous_ = x.T_map_imu();
+    rest_.pose = previous_;
+    rest_corners_.start(cloud_.corners);
+    rest_surfaces_.start(cloud_.surfaces);
+    if (filters()) {
+        predictor_.start_filter();
+        covariance_ = matched_covariance_ = start_covariance();
+        r.has_pose = true;
+        health_ = Health::kOk;
+        r.status = ScanStatus::kMapInitialised;
+        grow_map(group, r);
+        return;
+    }
     if (imu_graph_.start(previous_, x.vel, x.gyro_bias, x.accel_bias) != GraphStatus::kOk) {
         start_anew("the inertial graph cannot start from this state", r);
         return;
@@ -232,116 +201,24 @@ void Host::Impl::start_map(const MeasureGroup& group, ScanResult& r) {
     grow_map(group, r);
 }
 
-/// Scan-to-map estimate of the pose; the prediction where that cannot be had.
-Pose Host::Impl::match(ScanResult& r) {
-    map_.refresh(r.stamp);
-    r.times.map = watch_.lap();
-    const Pose predicted = predictor_.state().T_map_imu();
-    const Mat6 P = predictor_.covariance();
-    adapter_.begin_scan({{previous_.R.data(), previous_.t.data()},
-                         {predicted.R.data(), predicted.t.data()},
-                         P.data(),
-                         cloud_.corners.size(),
-                         cloud_.surfaces.size()});
-    Pose estimate = predicted;
-    report_ = MatchReport{};
-    const bool enough = enough_features();
-    if (enough) {
-        report_ = matcher_.align({cloud_.corners, cloud_.surfaces, map_.corners(), map_.surfaces()},
-                                 estimate);
-    }
-    if (matched()) {
-        if (const std::optional<Mat3> world = predictor_.orientation()) {
-            estimate.R = blend_tilt(estimate.R, *world, config_.rpy_weight);
-        }
-        covariance_ = pose_covariance(P, report_.information, config_.matching.variance);
-        matched_covariance_ = covariance_;
-    } else {
-        estimate = predicted;
-        covariance_ = matched_covariance_ + P;
-    }
-    adapter_.end_scan({estimate.R.data(), estimate.t.data()}, report_.converged);
-    r.diagnostics = adapter_.diagnostics();
-    r.diagnostics.iterations = report_.iterations;
-    judge(report_, r);
-    if (!enough) r.status = ScanStatus::kTooFewPoints;
-    r.times.search = report_.search_ms;
-    r.times.update = watch_.lap() - report_.search_ms;
-    return estimate;
-}
-
-void Host::Impl::judge(const MatchReport& report, ScanResult& r) {
-    failures_ = report.status == MatchStatus::kNumericalFailure ? failures_ + 1 : 0;
-    switch (report.status) {
-        case MatchStatus::kOk:
-            r.status = ScanStatus::kOk;
-            health_ = report.degenerate ? Health::kDegenerate : Health::kOk;
-            degenerate_ += report.degenerate ? 1 : 0;
-            return;
-        case MatchStatus::kFewRows:
-            r.status = ScanStatus::kNoCorrespondence;
-            break;
-        case MatchStatus::kNumericalFailure:
-            r.status = ScanStatus::kNumericalFailure;
-            break;
-    }
-    ++lost_;
-    health_ = Health::kLost;
-}
-
-/// Hands the estimate to the inertial graph and takes back what it knows of velocity and biases.
-void Host::Impl::correct(const Pose& estimate, ScanResult& r) {
-    CorrectionNoise noise{config_.correction_rotation, config_.correction_translation,
-                          config_.degenerate_rotation, config_.degenerate_translation};
-    const bool own_remedy = !adapter_.has_prior();
-    const Mat6 C = !matched()   ? lost_covariance(noise)
-                   : own_remedy ? upstream_correction(noise, report_.remapped)
-                                : weak_correction(noise, r.diagnostics);
-    const GraphStatus status =
-        imu_graph_.correct(loop_correction_.inverse() * estimate,
-                           turn_position(loop_correction_.R.transpose(), C), predictor_.steps());
-    if (status != GraphStatus::kOk) {
-        ++graph_events_;
-        say(r, status == GraphStatus::kReset ? "speed or bias out of bounds: inertial graph reset"
-                                             : "inertial graph recovered");
-    }
-    predictor_.correct(estimate, loop_correction_.R, imu_graph_.state(), matched());
-    previous_ = estimate;
-}
-
-void Host::Impl::grow_map(const MeasureGroup& group, ScanResult& r) {
-    if (map_.due(previous_, group.end)) {
-        map_.add(previous_, group.end, cloud_.corners, cloud_.surfaces);
-        keyframes_.add(previous_);
-        close_loop(r);
-    }
-    r.times.map += watch_.lap();
-}
-
-/// Where the newest keyframe closes a loop: all keyframes move, and the estimate with the newest,
-/// which is matched thereby if it was not before.
-void Host::Impl::close_loop(ScanResult& r) {
-    const std::optional<Loop> loop = loops_.find(map_);
-    if (!loop) return;
-    const double variance = std::max(loop->fitness, kLeastLoopVariance);
-    const GraphStatus status = keyframes_.add_loop(loop->from, loop->to, loop->T_from_to, variance);
-    if (status != GraphStatus::kOk || !keyframes_.moved()) return;
-    for (std::size_t i = 0; i < map_.size(); ++i) map_.set_pose(i, keyframes_.pose(i));
-    const Pose moved = keyframes_.pose(loop->to) * previous_.inverse();
-    loop_correction_ = moved * loop_correction_;
-    previous_ = keyframes_.pose(loop->to);
-    predictor_.correct(previous_, loop_correction_.R, imu_graph_.state(), true);
-    matched_covariance_ = covariance_;
-    ++loops_closed_;
-    say(r, "loop closed with keyframe " + std::to_string(loop->from));
-}
-
 void Host::Impl::finish(ScanResult& r) const {
     r.health = health_;
     r.map_points = map_.corners().size() + map_.surfaces().size();
     if (!r.has_pose) return;
     r.state = predictor_.state();
     r.covariance = ros_order(previous_, covariance_);
+}
+
+/// Corners, then surfaces, as the adapter counts them.
+std::vector<Eigen::Vector3f> Host::Impl::scan_points() const {
+    std::vector<Eigen::Vector3f> out;
+    if (!judged_) return out;
+    for (const auto* part : {&cloud_.corners, &cloud_.surfaces}) {
+        for (const Eigen::Vector3f& p : *part) {
+            out.push_back((previous_ * p.cast<double>()).cast<float>());
+        }
+    }
+    return out;
 }
 
 HostCounts Host::Impl::counts() const {
@@ -387,6 +264,28 @@ std::optional<ScanResult> Host::step() { return impl_->step(); }
 HostCounts Host::counts() const { return impl_->counts(); }
 SyncReport Host::sync_report() const { return impl_->intake_.report(); }
 std::size_t Host::map_bytes() const { return impl_->map_.memory_bytes(); }
+
+void Host::reconfigure(const ParamMap& changes) {
+    const auto method = changes.find("degeneracy.method");
+    const bool filters = impl_->adapter_.reads_surfaces();
+    if (method != changes.end() && (method->second == "noise_aware") != filters) {
+        throw ConfigError(method->first, method->second,
+                          "no change to or from noise_aware while running");
+    }
+    Adapter scratch;
+    d2lio::reconfigure(changes, scratch, impl_->adapter_, impl_->params_);
+}
+
+std::vector<Eigen::Vector3f> Host::scan_points() const { return impl_->scan_points(); }
+
+std::vector<Verdict> Host::verdicts() const {
+    std::vector<Verdict> out;
+    if (!impl_->judged_) return out;
+    for (std::size_t i = 0; i < impl_->adapter_.verdict_count(); ++i) {
+        out.push_back(impl_->adapter_.verdict(i));
+    }
+    return out;
+}
 
 std::vector<Eigen::Vector3f> Host::map_points() const {
     std::vector<Eigen::Vector3f> out = impl_->map_.corners().points();

@@ -7,6 +7,7 @@
 #include <algorithm>
 
 #include "d2lio/geometry/so3.hpp"
+#include "d2lio/imu/hold.hpp"
 
 namespace d2lio::liosam {
 namespace {
@@ -58,13 +59,53 @@ void Predictor::reset() {
     start_.reset();
     stepper_.reset();
     steps_.clear();
+    rest_.reset();
+}
+
+void Predictor::start_filter() { P_ = d2lio::start_covariance(); }
+
+void Predictor::hold(const Pose& rest) {
+    hold_still(rest, x_, P_);
+    steps_.clear();
+}
+
+/// With the pose's error a and the others' b, jointly normal: b follows by P_ba P_aa^-1 a, and its
+/// covariance shrinks as far as that of the pose does.
+void Predictor::fuse(const Pose& T, const Mat6& covariance) {
+    using Mat23x6 = Eigen::Matrix<double, 23, 6>;
+    const Mat6 prior = this->covariance();
+    const Eigen::LLT<Mat6> llt(prior);
+    if (llt.info() != Eigen::Success || !covariance.allFinite()) return;
+    Mat23x6 cross;
+    cross << P_.middleCols<3>(I::kRot), P_.middleCols<3>(I::kPos);
+    const Mat23x6 gain = llt.solve(cross.transpose()).transpose();
+    Vec6 moved;
+    moved << log_so3(x_.rot.transpose() * T.R), T.t - x_.pos;
+    Vec23 d = gain * moved;
+    d.segment<3>(I::kRot) = moved.head<3>();
+    d.segment<3>(I::kPos) = moved.tail<3>();
+    const NavState next = state_plus(x_, d);
+    const Mat23x23 reduced = P_ - gain * (prior - covariance) * gain.transpose();
+    if (!next.is_finite() || !reduced.allFinite()) return;
+    x_ = next;
+    P_ = 0.5 * (reduced + reduced.transpose());
+    steps_.clear();
+}
+
+void Predictor::move(const Pose& correction) {
+    const Pose moved = correction * x_.T_map_imu();
+    x_.rot = moved.R;
+    x_.pos = moved.t;
+    x_.vel = correction.R * x_.vel;
+    x_.gravity = correction.R * x_.gravity;
 }
 
 bool Predictor::initialise(const std::vector<ImuSample>& samples) {
     const ImuStart::Progress progress = start_.add(samples);
     if (progress != ImuStart::Progress::kReady) return progress != ImuStart::Progress::kFault;
     const ImuSample& newest = samples.back();
-    stepper_.start(newest, start_.in_g() ? kStandardGravity : 1.0);
+    accel_scale_ = start_.in_g() ? kStandardGravity : 1.0;
+    stepper_.start(newest, accel_scale_);
     x_ = NavState{};
     x_.extrinsic_rot = extrinsic_.R;
     x_.extrinsic_pos = extrinsic_.t;
@@ -89,6 +130,7 @@ std::optional<Mat3> Predictor::orientation() const {
 
 /// Densities as covariances per step, which enter propagate() as dt^2 Q.
 Mat12 Predictor::noise_over(double dt, double scale) const {
+    if (rest_.knows_noise()) return scale * rest_.noise(accel_scale_).matrix();
     const ImuGraphOptions& n = config_.imu;
     const double per_step = scale / std::max(dt, kShortestStep);
     const auto variance = [per_step](double density) { return density * density * per_step; };

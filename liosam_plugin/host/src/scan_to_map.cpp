@@ -83,19 +83,24 @@ bool ScanToMap::fit(Feature feature, std::size_t index, const Neighbours& near,
     if (status == PlaneStatus::kSingular) adapter_.mark_singular(feature, index);
     if (status != PlaneStatus::kOk) return false;
     m.normal = plane.normal;
-    m.distance = static_cast<double>(plane.signed_distance(q));
+    float distance = plane.signed_distance(q);
+    if (m.patch != nullptr) {
+        *m.patch = make_patch(xyz, kStride, kNeighbours, plane.normal, sensor_);
+        distance -= m.patch->side * bends_.at(m.patch->facing) * m.patch->sag(plane.normal, q);
+    }
+    m.distance = static_cast<double>(distance);
     return true;
 }
 
 ScanToMap::Row ScanToMap::match(Feature feature, std::size_t index, const Eigen::Vector3f& p_imu,
-                                const IkdTree& map, const Pose& T, Memory& memory) {
-    Row row{Vec6::Zero(), 0.0, false};
+                                const IkdTree& map, const Pose& T, Memory& memory, Patch* patch) {
     const Vec3 p = p_imu.cast<double>();
+    Row row{Vec6::Zero(), 0.0, false, 1.0, patch != nullptr, p};
     const Eigen::Vector3f q = (T * p).cast<float>();
     const double range = p.norm();
     Neighbours near;
     search(q, map, memory, near);
-    Match m{Eigen::Vector3f::Zero(), 0.0};
+    Match m{Eigen::Vector3f::Zero(), 0.0, patch};
     if (!admit(feature, index, range, near, map) || !fit(feature, index, near, q, m)) return row;
     const double weight =
         adapter_.weigh(feature, index, weight_of(options_, feature, m.distance, range));
@@ -103,6 +108,7 @@ ScanToMap::Row ScanToMap::match(Feature feature, std::size_t index, const Eigen:
     const Vec3 n = m.normal.cast<double>();
     row.jacobian << weight * p.cross(T.R.transpose() * n), weight * n;
     row.residual = weight * m.distance;
+    row.weight = weight;
     row.used = std::isfinite(row.residual) && row.jacobian.allFinite();
     return row;
 }
@@ -111,12 +117,16 @@ ScanToMap::Row ScanToMap::match(Feature feature, std::size_t index, const Eigen:
 int ScanToMap::linearise(const MatchInput& in, const Pose& T, Mat6& AtA, Vec6& Atb) {
     const std::size_t corners = in.corners.size();
     rows_.resize(corners + in.surfaces.size());
+    const bool surfaces = adapter_.reads_surfaces();
+    if (surfaces) patches_.resize(rows_.size());
     loop_(rows_.size(), [&](std::size_t i) {
-        rows_[i] = i < corners
-                       ? match(Feature::kCorner, i, in.corners[i], in.corner_map, T, memory_[i])
-                       : match(Feature::kSurface, i - corners, in.surfaces[i - corners],
-                               in.surface_map, T, memory_[i]);
+        rows_[i] =
+            i < corners
+                ? match(Feature::kCorner, i, in.corners[i], in.corner_map, T, memory_[i], nullptr)
+                : match(Feature::kSurface, i - corners, in.surfaces[i - corners], in.surface_map, T,
+                        memory_[i], surfaces ? &patches_[i] : nullptr);
     });
+    if (surfaces) clean(T);
     AtA.setZero();
     Atb.setZero();
     int used = 0;
@@ -130,11 +140,59 @@ int ScanToMap::linearise(const MatchInput& in, const Pose& T, Mat6& AtA, Vec6& A
     return used;
 }
 
+/// Takes what noise has put into the rows along blind directions out of them (method noise_aware).
+/// A line's row cannot prove anything there: of its neighbours nothing is known but the line.
+void ScanToMap::clean(const Pose& T) {
+    SurfaceSums sums;
+    for (std::size_t i = 0; i < rows_.size(); ++i) {
+        const Row& row = rows_[i];
+        if (row.used && row.has_patch) sums.add(row.jacobian.tail<3>() / row.weight, patches_[i]);
+    }
+    const BlindDirections blind = adapter_.find_blind(sums);
+    if (blind.count == 0 || resting_) return;
+    Patch unproven;
+    unproven.doubt = Eigen::Vector3f::Constant(kInfinity);
+    int cleaned = 0;
+    for (std::size_t i = 0; i < rows_.size(); ++i) {
+        Row& row = rows_[i];
+        if (!row.used) continue;
+        const Vec3 n = row.jacobian.tail<3>() / row.weight;
+        const CleanedRow out =
+            cleaned_row(n, row.has_patch ? patches_[i] : unproven, blind, adapter_.noise_aware());
+        if (out.normal == n && out.weight == 1.0) continue;
+        const Vec3 kept = row.weight * out.weight * out.normal;
+        row.jacobian << row.p.cross(T.R.transpose() * kept), kept;
+        row.residual *= out.weight;
+        if (out.normal != n) ++cleaned;
+    }
+    adapter_.note_cleaned(cleaned);
+}
+
+/// Adds information W of the guess: the cost |e|^2_W, e = (Log(R_guess^T R), t - t_guess), in units
+/// of the rows' variance.
+void ScanToMap::add_prior(const Pose& T, Mat6& AtA, Vec6& Atb) const {
+    Vec6 e;
+    e << log_so3(guess_.R.transpose() * T.R), T.t - guess_.t;
+    Mat6 J = Mat6::Identity();
+    J.topLeftCorner<3, 3>() = right_jacobian_inverse_so3(e.head<3>());
+    const Mat6 W = options_.variance * *prior_;
+    AtA.noalias() += J.transpose() * W * J;
+    Atb.noalias() -= J.transpose() * (W * e);
+}
+
+void ScanToMap::learn_bends() {
+    for (std::size_t i = 0; i < rows_.size(); ++i) {
+        if (rows_[i].used && rows_[i].has_patch) bends_.add(patches_[i]);
+    }
+    bends_.end_scan();
+}
+
 /// LIO-SAM's own remedy (Zhang 2016): directions of the mixed-unit A^T A with an eigenvalue below
 /// the threshold get no step. Found at the first iteration, kept for the scan.
 void ScanToMap::find_remapping(const Mat6& AtA, MatchReport& report) {
     keep_.setIdentity();
-    if (adapter_.has_prior() || options_.eigenvalue_threshold <= 0.0) return;
+    const bool own = !adapter_.has_prior() && prior_ == nullptr;
+    if (!own || options_.eigenvalue_threshold <= 0.0) return;
     const Eigen::SelfAdjointEigenSolver<Mat6> solver(AtA);
     for (int i = 0; i < 6; ++i) {
         if (solver.eigenvalues()[i] >= options_.eigenvalue_threshold) continue;
@@ -160,6 +218,7 @@ bool ScanToMap::step(const MatchInput& input, Pose& T, MatchReport& report) {
     ++report.iterations;
     adapter_.condition_tangent({T.R.data(), T.t.data()}, options_.variance,
                                {AtA.data(), Atb.data()});
+    if (prior_ != nullptr) add_prior(T, AtA, Atb);
     report.degenerate = adapter_.degenerate() || report.remapped;
     const Vec6 whole = AtA.ldlt().solve(Atb);
     const Vec6 d = adapter_.step_factor(whole.data(), AtA.data()) * keep_ * whole;
@@ -175,8 +234,11 @@ bool ScanToMap::step(const MatchInput& input, Pose& T, MatchReport& report) {
     return !report.converged;
 }
 
-MatchReport ScanToMap::align(const MatchInput& input, Pose& T_map_imu) {
+MatchReport ScanToMap::align(const MatchInput& input, Pose& T_map_imu, const Mat6* prior) {
     MatchReport report;
+    prior_ = prior;
+    guess_ = T_map_imu;
+    sensor_ = T_map_imu.t.cast<float>();
     bounded_search_ = !adapter_.rejects();
     memory_.assign(input.corners.size() + input.surfaces.size(),
                    {Eigen::Vector3f::Zero(), kInfinity});
@@ -184,6 +246,7 @@ MatchReport ScanToMap::align(const MatchInput& input, Pose& T_map_imu) {
     while (report.iterations < options_.max_iterations && step(input, T, report)) {
     }
     if (report.status != MatchStatus::kNumericalFailure) T_map_imu = T;
+    if (adapter_.reads_surfaces()) learn_bends();
     return report;
 }
 

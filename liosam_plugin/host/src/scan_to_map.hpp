@@ -4,6 +4,8 @@
 
 #include <vector>
 
+#include "d2lio/degeneracy/bend.hpp"
+#include "d2lio/degeneracy/blind.hpp"
 #include "d2lio/host/point_loop.hpp"
 #include "d2lio/liosam/adapter.hpp"
 #include "d2lio/map/ikd_tree.hpp"
@@ -60,13 +62,21 @@ class ScanToMap {
 
     /// @param T_map_imu the initial guess, replaced by the estimate. Call between the adapter's
     /// begin_scan and end_scan.
-    MatchReport align(const MatchInput& input, Pose& T_map_imu);
+    /// @param prior information of the guess (rotation in the body's right tangent, position in the
+    /// map), which the estimate then contains; null: the scan alone decides.
+    MatchReport align(const MatchInput& input, Pose& T_map_imu, const Mat6* prior = nullptr);
+    /// At rest the rows are only looked at (method noise_aware).
+    void set_resting(bool resting) { resting_ = resting; }
+    void reset() { bends_.reset(); }
 
   private:
     struct Row {
         Vec6 jacobian;  ///< rotation (right tangent), translation (map)
         double residual;
         bool used;
+        double weight = 1.0;     ///< contained in both
+        bool has_patch = false;  ///< a plane's row; lines have none
+        Vec3 p = Vec3::Zero();   ///< the point, body frame, m
     };
     /// The last search of a feature: the next one need look no farther than its neighbours are now.
     struct Memory {
@@ -76,6 +86,7 @@ class ScanToMap {
     struct Match {
         Eigen::Vector3f normal;
         double distance;
+        Patch* patch;  ///< where to put a plane's, or null
     };
 
     void search(const Eigen::Vector3f& query, const IkdTree& map, Memory& memory,
@@ -85,10 +96,13 @@ class ScanToMap {
     bool fit(Feature feature, std::size_t index, const Neighbours& near,
              const Eigen::Vector3f& query, Match& match);
     Row match(Feature feature, std::size_t index, const Eigen::Vector3f& p, const IkdTree& map,
-              const Pose& T, Memory& memory);
+              const Pose& T, Memory& memory, Patch* patch);
     int linearise(const MatchInput& input, const Pose& T, Mat6& AtA, Vec6& Atb);
     void find_remapping(const Mat6& AtA, MatchReport& report);
     bool step(const MatchInput& input, Pose& T, MatchReport& report);
+    void clean(const Pose& T);
+    void add_prior(const Pose& T, Mat6& AtA, Vec6& Atb) const;
+    void learn_bends();
 
     Adapter& adapter_;
     MatchOptions options_;
@@ -97,6 +111,12 @@ class ScanToMap {
     std::vector<Row> rows_;
     std::vector<Memory> memory_;
     Mat6 keep_ = Mat6::Identity();
+    bool resting_ = false;
+    std::vector<Patch> patches_;  ///< of the rows; only while the adapter reads surfaces
+    BendField bends_;
+    Eigen::Vector3f sensor_ = Eigen::Vector3f::Zero();  ///< map frame
+    const Mat6* prior_ = nullptr;                       ///< of the scan being aligned
+    Pose guess_;
 };
 
 }  // namespace d2lio::liosam

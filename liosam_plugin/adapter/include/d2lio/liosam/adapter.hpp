@@ -80,6 +80,10 @@ class Adapter : public Plugin {
     bool degenerate() const;
     Status end_scan(const PoseView& estimate, bool converged);
 
+    /// What became of the last scan's points: corners, then surfaces, in their order.
+    std::size_t verdict_count() const;
+    Verdict verdict(std::size_t i) const;  ///< kFewNeighbours past the end
+
   private:
     struct Impl;
     std::unique_ptr<Impl> impl_;

@@ -43,6 +43,13 @@ class Host {
     /// Processes the next scan whose inertial data is complete; nothing if there is none.
     std::optional<ScanResult> step();
 
+    /// Changes parameters of rejection and degeneracy between two scans; the estimate goes on.
+    /// @throws ConfigError for any other key or a refused value; nothing has changed then.
+    void reconfigure(const ParamMap& changes);
+
+    /// The points that the last scan was matched with, map frame, m; none if it was not.
+    std::vector<Eigen::Vector3f> scan_points() const;
+    std::vector<Verdict> verdicts() const;            ///< what became of each of them
     std::vector<Eigen::Vector3f> map_points() const;  ///< current submap, map frame, m
     HostCounts counts() const;
     SyncReport sync_report() const;  ///< whether data flow, and if not, why
