@@ -62,14 +62,16 @@ class Variant:
     @property
     def group(self) -> str:
         """Title over the rows that differ in the rejection mode only."""
-        prior = "" if self.degeneracy == "none" else " + prior"
-        return SHORT_TITLES.get(self.host, self.host) + prior
+        return SHORT_TITLES.get(self.host, self.host) + self._method
 
     @property
     def label(self) -> str:
         """Name of the row where its group is not in sight."""
-        prior = "" if self.degeneracy == "none" else " + prior"
-        return f"{SHORT_TITLES.get(self.host, self.host)} {self.rejection}{prior}"
+        return f"{SHORT_TITLES.get(self.host, self.host)} {self.rejection}{self._method}"
+
+    @property
+    def _method(self) -> str:
+        return {"none": "", "paper": " + prior"}.get(self.degeneracy, f" + {self.degeneracy}")
 
     @property
     def directory(self) -> str:
@@ -83,18 +85,20 @@ SCENES = (
     Scene("room", "Room", None),
 )
 # The whole ablation on the FAST-LIO2 host; of the others what shows the step from LIO-SAM as it is
-# to D2-LIO as it is, whose defaults are point_adaptive and paper.
+# to D2-LIO as it is, whose defaults are point_adaptive and noise_aware.
 VARIANTS = (
     *(
         Variant(rejection, degeneracy)
         for degeneracy in ("none", "paper")
         for rejection in REJECTION_MODES
     ),
+    Variant("off", "noise_aware"),
     Variant("off", "none", "liosam"),
     Variant("point_adaptive", "none", "liosam"),
     Variant("point_adaptive", "paper", "liosam"),
     Variant("off", "none", "d2lio"),
     Variant("point_adaptive", "paper", "d2lio"),
+    Variant("point_adaptive", "noise_aware", "d2lio"),
 )
 
 
