@@ -7,10 +7,10 @@
 namespace d2lio {
 namespace {
 
-constexpr double kKeep = 0.9;               ///< share of the past that a new scan leaves
-constexpr double kPointVariance = 4e-4;     ///< m^2, of a neighbour's distance from the surface
+constexpr double kKeep = 0.9;                ///< share of the past that a new scan leaves
+constexpr double kPointVariance = 4e-4;      ///< m^2, of a neighbour's distance from the surface
 constexpr double kSignificance = 2.0 * 2.0;  ///< sigmas squared
-constexpr double kMinRun = 1e-12;           ///< m^4
+constexpr double kMinRun = 1e-12;            ///< m^4
 
 /// The estimate, shrunk by the share of it that noise alone may give (James, Stein 1961).
 double shrunk(double bend, double variance) {

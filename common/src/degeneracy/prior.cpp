@@ -38,8 +38,9 @@ void DegeneracyConfig::bind(ParamTable& table) {
               "rotation eigenvalue below which method remap keeps the prediction");
     table.add("degeneracy.threshold_t", threshold_t, {0.0, 1e9}, "points",
               "translation eigenvalue below which method remap keeps the prediction");
-    table.add("degeneracy.share_low", noise_aware.share_low, {0.0, 1e3}, "",
-              "share of a direction's information that may be noise before method noise_aware acts");
+    table.add(
+        "degeneracy.share_low", noise_aware.share_low, {0.0, 1e3}, "",
+        "share of a direction's information that may be noise before method noise_aware acts");
     table.add("degeneracy.share_high", noise_aware.share_high, {1e-6, 1e3}, "",
               "share from which on method noise_aware acts fully; above share_low");
     table.add("degeneracy.significance", noise_aware.significance, {0.0, 1e3}, "sigma",

@@ -2,12 +2,12 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
-#include "d2lio/imu/rest.hpp"
 #include <string>
 #include <vector>
 
 #include "d2lio/fastlio/config.hpp"
 #include "d2lio/host/imu_intake.hpp"
+#include "d2lio/imu/rest.hpp"
 
 namespace d2lio::fastlio {
 

@@ -13,8 +13,9 @@ namespace d2lio {
 ///
 /// A plane through points of a bent surface cuts it: the points between its supports lie beyond it.
 /// In a tunnel with a flat road that pushes the pose down scan after scan, and the map with it,
-/// until the pitch is wrong by milliradians. One patch of five points cannot tell a bend from noise;
-/// all patches that face the same way can. What is not significant (two sigma) counts as flat.
+/// until the pitch is wrong by milliradians. One patch of five points cannot tell a bend from
+/// noise; all patches that face the same way can. What is not significant (two sigma) counts as
+/// flat.
 class BendField {
   public:
     /// Bend of a facing as learnt from earlier scans.

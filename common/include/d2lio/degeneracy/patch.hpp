@@ -19,13 +19,13 @@ struct Patch {
     float bend_rise = 0.F;  ///< m^3
     float bend_run = 0.F;   ///< m^4
     /// Plane fit of half the squared in-plane distance, which a bent surface adds to its plane.
-    float sag_mean = 0.F;                                  ///< m^2
+    float sag_mean = 0.F;                                 ///< m^2
     Eigen::Vector3f sag_slope = Eigen::Vector3f::Zero();  ///< m, in the plane
     float side = 1.F;  ///< 1: the fitted normal looks at the sensor, -1: away from it
     int facing = 0;    ///< bin of the direction the surface faces
 
-    /// Variance of n . d for a direction d (unit), doubt included; with a second-order term, so that
-    /// a normal that is uncertain by more than half a radian says nothing about any direction.
+    /// Variance of n . d for a direction d (unit), doubt included; with a second-order term, so
+    /// that a normal that is uncertain by more than half a radian says nothing about any direction.
     /// @param a n . d of the fitted normal.
     double variance_along(const Eigen::Vector3d& d, double a) const;
     /// Distance of a surface of unit bend from the fitted plane at p (m^2); multiply by the bend.

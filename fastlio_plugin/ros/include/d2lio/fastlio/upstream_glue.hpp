@@ -100,10 +100,9 @@ class UpstreamGlue {
         rows_ = static_cast<int>(H.rows());
         last_ = here;
         PriorBlock prior;
-        adapter_.condition(
-            {H.data(), z.data(), rows_, H.rowStride(), H.colStride(), kPosition, kRotation,
-             kExtrinsic},
-            here.view(), variance, &prior);
+        adapter_.condition({H.data(), z.data(), rows_, H.rowStride(), H.colStride(), kPosition,
+                            kRotation, kExtrinsic},
+                           here.view(), variance, &prior);
         if (prior.count == 0) return;
         H.conservativeResize(rows_ + prior.count, H.cols());
         z.conservativeResize(rows_ + prior.count);
@@ -151,8 +150,9 @@ class UpstreamGlue {
     }
 
   private:
-    static constexpr int kPosition = 0, kRotation = 3, kExtrinsic = 6;  ///< FAST-LIO2's order of the state
-    static constexpr double kConverged = 0.001;         ///< upstream's limit, m and rad
+    static constexpr int kPosition = 0, kRotation = 3,
+                         kExtrinsic = 6;         ///< FAST-LIO2's order of the state
+    static constexpr double kConverged = 0.001;  ///< upstream's limit, m and rad
 
     struct PoseCopy {
         double R[9] = {1, 0, 0, 0, 1, 0, 0, 0, 1};  ///< column-major

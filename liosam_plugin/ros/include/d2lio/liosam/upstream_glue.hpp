@@ -54,7 +54,8 @@ class UpstreamGlue {
                                    "imu.degenerate_rotation", "imu.degenerate_translation"});
         if (adapter_.reads_surfaces()) {  // upstream shows the adapter no neighbours
             throw std::invalid_argument(
-                "D2-LIO cannot start:\n  degeneracy.method = noise_aware: not inside LIO-SAM; allowed "
+                "D2-LIO cannot start:\n  degeneracy.method = noise_aware: not inside LIO-SAM; "
+                "allowed "
                 "there: none, paper, remap");
         }
         changes_ = adapter_.rejects() || adapter_.has_prior();
