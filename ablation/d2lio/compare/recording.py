@@ -33,6 +33,7 @@ from d2lio.errors import DataError
 from d2lio.metrics.tum import Trajectory
 from d2lio.report.cloud import load_map
 
+LEAST_EIGENVALUE = 1e-3  # points; rows cleaned of noise leave rounding alone below it
 APPLICATION = "d2lio_compare"
 RECORDING_FILE = "compare.rrd"
 BOARDS = 300  # states of the scoreboard over a sequence, at most one per second
@@ -257,7 +258,7 @@ def _values(row: Row) -> dict[str, float | None]:
     if offered and accepted is not None:
         rejected = 100.0 * (1.0 - accepted / offered)
     return {
-        "lambda": float(np.log10(smallest)) if smallest and smallest > 0.0 else None,
+        "lambda": None if smallest is None else float(np.log10(max(smallest, LEAST_EIGENVALUE))),
         "rejected": rejected,
         "time": board.number(row.get("time_total_ms")),
     }
