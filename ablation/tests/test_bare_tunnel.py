@@ -125,7 +125,7 @@ def test_end_error_is_split_along_and_across_the_motion() -> None:
     estimate = Trajectory(stamps, to_map.apply(wrong) + 7.0, (to_map * turned).as_quat())
     covariance = np.tile(np.diag([1.0, 4.0, 9.0, 1.0, 1.0, 1.0]), (3, 1, 1))
     error = end_error(Track(estimate, covariance), truth)
-    assert error == pytest.approx(EndError(along=-0.4, across=0.05, sigma_along=2.0))
+    assert tuple(error) == pytest.approx((-0.4, 0.05, 2.0))
     with pytest.raises(DataError, match="cover"):
         end_error(Track(estimate, covariance), truth.select(np.array([0, 1])))
 
