@@ -6,6 +6,7 @@ from __future__ import annotations
 
 import json
 import os
+import sys
 import shutil
 from pathlib import Path
 
@@ -29,7 +30,7 @@ HELPERS = Path(__file__).resolve().parent.parent
 
 
 def test_a_variant_is_what_run_and_evaluate_give(compared: Compared, tmp_path: Path) -> None:
-    options = RunOptions(rejection="point_adaptive", degeneracy="paper")
+    options = RunOptions(rejection="point_adaptive", degeneracy="noise_aware")
     run(open_source(compared.sequence), options, tmp_path / "run")
     expected, _ = evaluate(tmp_path / "run" / "trajectory.tum", compared.sequence / "gt.tum")
     row = {r.variant: r for r in compared.results.rows}["d2"]
@@ -57,8 +58,10 @@ def test_the_files_are_those_of_an_ablation(compared: Compared) -> None:
 @pytest.fixture
 def crash_host(monkeypatch: pytest.MonkeyPatch):
     """The host `crash` of the ablation's tests, in the processes of runs as well."""
+    from d2lio import hosts
     from d2lio.ablate.execute import close_slots
 
+    before = dict(hosts.HOSTS)
     paths = [str(HELPERS / "ablate"), str(HELPERS), os.environ.get("PYTHONPATH", "")]
     monkeypatch.setenv("PYTHONPATH", os.pathsep.join(filter(None, paths)))
     monkeypatch.setenv("D2LIO_PLUGINS", "plugin_hosts")
@@ -66,6 +69,9 @@ def crash_host(monkeypatch: pytest.MonkeyPatch):
     close_slots()
     yield "crash"
     close_slots()
+    sys.modules.pop("plugin_hosts", None)
+    hosts.HOSTS.clear()
+    hosts.HOSTS.update(before)
 
 
 def test_a_crash_is_a_failed_row_and_the_others_go_on(
