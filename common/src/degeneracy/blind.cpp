@@ -15,7 +15,8 @@ constexpr double kCosCone = 0.966;   ///< cos 15 deg: within it the filter's axi
 /// The test of a row is soft: between these multiples of the threshold it fades.
 constexpr double kSoftFrom = 0.7, kSoftTo = 1.3;
 constexpr double kSpeaks = 0.05;  ///< component from which on a row speaks of a blind direction
-constexpr double kSharedWeight = 0.5;  ///< of a row that does
+constexpr double kSharedWeight = 0.5;  ///< of a row that does, if it is the only one
+constexpr double kFew = 20.0;          ///< rows' worth of proven information that is little
 
 Vec3 steadied(const Vec3& axis, const BlockSpectrum& P) {
     const Vec3 longest = P.v.col(2);
@@ -62,22 +63,40 @@ BlindDirections find_blind(const NoiseShare& share, const Mat3& P_t,
     return out;
 }
 
-CleanedRow cleaned_row(const Vec3& normal, const Patch& patch, const BlindDirections& blind,
-                       const NoiseAwareConfig& config) {
-    CleanedRow out{normal, 1.0};
+Vec3 proven_share(const Vec3& normal, const Patch& patch, const BlindDirections& blind,
+                  const NoiseAwareConfig& config) {
     const double k = config.significance * config.significance;
-    double proven = 0.0;
+    Vec3 share = Vec3::Zero();
     for (int i = 0; i < blind.count; ++i) {
         const Vec3 d = blind.axes.col(i);
-        const double a = out.normal.dot(d);
+        const double a = normal.dot(d);
         const double limit = k * patch.variance_along(d, a);
-        const bool clear = a * a >= kSoftTo * limit;
-        const double kept = clear ? 1.0 : smooth_step(a * a / limit, kSoftFrom, kSoftTo);
-        out.normal -= blind.blend[i] * (1.0 - kept) * a * d;
-        proven += blind.blend[i] * kept * kept * a * a;
+        const bool clear = a * a >= kSoftTo * limit;  // also of a fit without any uncertainty
+        share[i] = clear ? 1.0 : smooth_step(a * a / limit, kSoftFrom, kSoftTo);
     }
-    const double speaks = proven / (kSpeaks * kSpeaks);
-    out.weight = 1.0 - (1.0 - kSharedWeight) * speaks / (1.0 + speaks);
+    return share;
+}
+
+void ProvenSum::add(const Vec3& normal, const Vec3& share, const BlindDirections& blind) {
+    for (int i = 0; i < blind.count; ++i) {
+        const double a = share[i] * normal.dot(blind.axes.col(i));
+        information[i] += a * a;
+    }
+}
+
+CleanedRow cleaned_row(const Vec3& normal, const Vec3& share, const BlindDirections& blind,
+                       const ProvenSum& sum) {
+    CleanedRow out{normal, 1.0};
+    double speaks = 0.0, alone = 0.0;
+    for (int i = 0; i < blind.count; ++i) {
+        const Vec3 d = blind.axes.col(i);
+        const double a = normal.dot(d);
+        out.normal -= blind.blend[i] * (1.0 - share[i]) * a * d;
+        const double proven = blind.blend[i] * share[i] * share[i] * a * a;
+        speaks += proven;
+        alone += proven * kFew / (kFew + sum.information[i]);
+    }
+    out.weight = 1.0 - (1.0 - kSharedWeight) * alone / (kSpeaks * kSpeaks + speaks);
     return out;
 }
 

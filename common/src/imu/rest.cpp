@@ -12,11 +12,16 @@ constexpr std::size_t kRecentBlocks = 5;  ///< scans whose motion may go unseen 
 constexpr double kSigmas = 5.5;
 constexpr double kMinSamples = 20.0;
 constexpr double kMaxSamples = 4000.0;  ///< older ones fade: a bias walks
+constexpr double kMostGyro = 0.02;      ///< rad/s, standard deviation of a sample at rest
+constexpr double kMostAccel = 0.015;    ///< of gravity
 
 constexpr double kMotionFactor = 4.0;  ///< noise in motion by that at rest (variances)
 /// (Bias walk by white noise)^2, 1/s^2: 0.001 to 0.04 for gyroscopes, 0.006 to 0.08 for
 /// accelerometers from tactical to consumer grade.
 constexpr double kWalkShare = 0.05;
+/// What readings without noise (a simulator's, a quantised sensor's) are taken to have.
+constexpr double kLeastGyro = 3e-4;   ///< rad/s
+constexpr double kLeastAccel = 5e-4;  ///< of gravity
 
 double freedom(double count, double blocks) { return std::max(count - blocks, 1.0); }
 
@@ -51,7 +56,9 @@ void RestDetector::merge(const Block& block) {
 
 bool RestDetector::moves() const {
     const Vec6d mean = past_.sum / past_.count;
-    const Vec6d variance = past_.squares / freedom(past_.count, past_blocks_);
+    Vec6d least;
+    least << Vec3::Constant(kLeastGyro * kLeastGyro), Vec3::Constant(least_accel());
+    const Vec6d variance = (past_.squares / freedom(past_.count, past_blocks_)).cwiseMax(least);
     double count = 0.0;
     Vec6d sum = Vec6d::Zero();
     for (auto it = recent_.rbegin(); it != recent_.rend(); ++it) {
@@ -73,11 +80,23 @@ void RestDetector::add(const std::vector<ImuSample>& samples) {
         merge(recent_.front());
         recent_.pop_front();
     }
-    if (past_.count >= kMinSamples && moves()) resting_ = false;
+    if (past_.count >= kMinSamples && (moves() || shakes())) resting_ = false;
+}
+
+/// Squared mean reading of the accelerometer, readings' unit.
+double RestDetector::gravity_squared() const {
+    return past_.sum.tail<3>().squaredNorm() / (past_.count * past_.count);
+}
+
+double RestDetector::least_accel() const { return kLeastAccel * kLeastAccel * gravity_squared(); }
+
+bool RestDetector::shakes() const {
+    return gyro_variance() > kMostGyro * kMostGyro ||
+           accel_variance() > kMostAccel * kMostAccel * gravity_squared();
 }
 
 bool RestDetector::knows_noise() const {
-    return past_.count >= kMinSamples && gyro_variance() > 0.0 && accel_variance() > 0.0;
+    return past_.count >= kMinSamples && past_.count >= 2.0 * past_blocks_;
 }
 
 double RestDetector::gyro_variance() const {
@@ -89,8 +108,8 @@ double RestDetector::accel_variance() const {
 }
 
 ProcessNoise RestDetector::noise(double accel_scale) const {
-    const double gyro = gyro_variance();
-    const double accel = accel_variance() * accel_scale * accel_scale;
+    const double gyro = std::max(gyro_variance(), kLeastGyro * kLeastGyro);
+    const double accel = std::max(accel_variance(), least_accel()) * accel_scale * accel_scale;
     ProcessNoise out;
     out.gyro = kMotionFactor * gyro;
     out.accel = kMotionFactor * accel;

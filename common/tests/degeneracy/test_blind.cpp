@@ -49,6 +49,12 @@ BlindDirections blind_x(double blend = 1.0) {
     return b;
 }
 
+/// A row that is alone in its scan, or one beside others.
+CleanedRow cleaned(const Vec3& n, const Patch& patch, const BlindDirections& blind,
+                   const NoiseAwareConfig& config, const ProvenSum& sum = {}) {
+    return cleaned_row(n, proven_share(n, patch, blind, config), blind, sum);
+}
+
 /// Unit normal with component a along x.
 Vec3 leaning(double a) { return {a, 0.0, std::sqrt(1.0 - a * a)}; }
 
@@ -124,40 +130,40 @@ TEST(CleanedRow, WithoutBlindDirectionsNothingIsTouched) {
     const BlindDirections none =
         find_blind(blind_along(Vec3::UnitX(), 0.1), Mat3::Identity(), kConfig);
     ASSERT_EQ(none.count, 0);
-    const CleanedRow row = cleaned_row(n, uncertain(1.F), none, kConfig);
+    const CleanedRow row = cleaned(n, uncertain(1.F), none, kConfig);
     EXPECT_EQ(row.normal, n);
     EXPECT_EQ(row.weight, 1.0);
 }
 
 TEST(CleanedRow, ANoisyRowLosesItsComponentAndNothingElse) {
     const Vec3 n = leaning(0.1);
-    const CleanedRow row = cleaned_row(n, uncertain(0.05F), blind_x(), kConfig);  // two sigma
+    const CleanedRow row = cleaned(n, uncertain(0.05F), blind_x(), kConfig);  // two sigma
     EXPECT_NEAR(row.normal.x(), 0.0, kExact);
     EXPECT_EQ(row.normal.z(), n.z());
     EXPECT_EQ(row.weight, 1.0);
-    const CleanedRow half = cleaned_row(n, uncertain(0.05F), blind_x(0.5), kConfig);
+    const CleanedRow half = cleaned(n, uncertain(0.05F), blind_x(0.5), kConfig);
     EXPECT_NEAR(half.normal.x(), 0.05, kExact);
 }
 
 TEST(CleanedRow, ASignificantRowStaysWhole) {
     const Vec3 n = leaning(0.5);
-    const CleanedRow row = cleaned_row(n, uncertain(0.02F), blind_x(), kConfig);  // 25 sigma
+    const CleanedRow row = cleaned(n, uncertain(0.02F), blind_x(), kConfig);  // 25 sigma
     EXPECT_EQ(row.normal, n);
     NoiseAwareConfig strict;
     strict.significance = 30.0;
-    EXPECT_NEAR(cleaned_row(n, uncertain(0.02F), blind_x(), strict).normal.x(), 0.0, kExact);
+    EXPECT_NEAR(cleaned(n, uncertain(0.02F), blind_x(), strict).normal.x(), 0.0, kExact);
 }
 
 TEST(CleanedRow, SixSigmasAreTheMiddleOfTheFade) {
     const Vec3 n = leaning(0.12);
-    const CleanedRow row = cleaned_row(n, uncertain(0.02F), blind_x(), kConfig);
+    const CleanedRow row = cleaned(n, uncertain(0.02F), blind_x(), kConfig);
     EXPECT_NEAR(row.normal.x(), 0.06, 1e-3);
 }
 
 TEST(CleanedRow, DoubtCountsAsNoise) {
     Patch doubted = uncertain(0.02F);
     doubted.doubt = {1.F, 0.F, 0.F};
-    EXPECT_NEAR(cleaned_row(leaning(0.9), doubted, blind_x(), kConfig).normal.x(), 0.0, kExact);
+    EXPECT_NEAR(cleaned(leaning(0.9), doubted, blind_x(), kConfig).normal.x(), 0.0, kExact);
 }
 
 TEST(CleanedRow, EachBlindDirectionIsJudgedByItself) {
@@ -168,7 +174,7 @@ TEST(CleanedRow, EachBlindDirectionIsJudgedByItself) {
     p.s1 = {0.2F, 0.F, 0.F};    // uncertain along x only
     p.s2 = {0.F, 0.005F, 0.F};  // and well known along y
     const Vec3 n = Vec3(0.3, 0.3, 0.9).normalized();
-    const CleanedRow row = cleaned_row(n, p, both, kConfig);
+    const CleanedRow row = cleaned(n, p, both, kConfig);
     EXPECT_NEAR(row.normal.x(), 0.0, kExact);
     EXPECT_EQ(row.normal.y(), n.y());
     EXPECT_EQ(row.normal.z(), n.z());
@@ -181,12 +187,12 @@ TEST(CleanedRow, TheAxisMayPointAnywhere) {
     Patch p;
     p.s1 = (0.1 * d).cast<float>();
     const Vec3 n = 0.2 * d + std::sqrt(0.96) * e;  // two sigma along the axis
-    EXPECT_LT((cleaned_row(n, p, slanted, kConfig).normal - std::sqrt(0.96) * e).norm(), 1e-7);
+    EXPECT_LT((cleaned(n, p, slanted, kConfig).normal - std::sqrt(0.96) * e).norm(), 1e-7);
 }
 
 TEST(CleanedRow, WhatProvesItselfIsHalved) {
     const auto weight = [](double a, double blend = 1.0) {
-        return cleaned_row(leaning(a), uncertain(1e-4F), blind_x(blend), kConfig).weight;
+        return cleaned(leaning(a), uncertain(1e-4F), blind_x(blend), kConfig).weight;
     };
     EXPECT_EQ(weight(0.0), 1.0);
     EXPECT_NEAR(weight(0.05), 0.75, 1e-6);
@@ -195,15 +201,34 @@ TEST(CleanedRow, WhatProvesItselfIsHalved) {
     EXPECT_GT(weight(0.1, 0.1), weight(0.1, 1.0));
 }
 
+TEST(CleanedRow, AmongManyThatProveThemselvesItKeepsItsWeight) {
+    const auto weight = [](double others) {
+        ProvenSum sum;
+        sum.information[0] = others;
+        return cleaned(leaning(1.0), uncertain(1e-4F), blind_x(), kConfig, sum).weight;
+    };
+    EXPECT_NEAR(weight(20.0), 0.75, 2e-3);
+    EXPECT_GT(weight(1e4), 0.998);
+    EXPECT_LT(weight(1e4), 1.0);
+}
+
+TEST(ProvenSum, AddsWhatIsProvenAlongTheBlindAxesOnly) {
+    ProvenSum sum;
+    for (int i = 0; i < 2; ++i) sum.add(leaning(0.5), Vec3(0.5, 1.0, 1.0), blind_x());
+    EXPECT_NEAR(sum.information[0], 2 * 0.25 * 0.25, kExact);
+    EXPECT_EQ(sum.information[1], 0.0);
+    EXPECT_EQ(sum.information[2], 0.0);
+}
+
 TEST(CleanedRow, ZeroSignificanceBelievesEveryRow) {
     NoiseAwareConfig trusting;
     trusting.significance = 0.0;
-    EXPECT_EQ(cleaned_row(leaning(0.1), uncertain(1.F), blind_x(), trusting).normal, leaning(0.1));
-    EXPECT_TRUE(cleaned_row(leaning(0.0), uncertain(0.F), blind_x(), trusting).normal.allFinite());
+    EXPECT_EQ(cleaned(leaning(0.1), uncertain(1.F), blind_x(), trusting).normal, leaning(0.1));
+    EXPECT_TRUE(cleaned(leaning(0.0), uncertain(0.F), blind_x(), trusting).normal.allFinite());
 }
 
 TEST(CleanedRow, APatchThatIsNotANumberSaysNothing) {
-    const CleanedRow row = cleaned_row(leaning(0.9), uncertain(std::nanf("")), blind_x(), kConfig);
+    const CleanedRow row = cleaned(leaning(0.9), uncertain(std::nanf("")), blind_x(), kConfig);
     EXPECT_NEAR(row.normal.x(), 0.0, kExact);
     EXPECT_EQ(row.weight, 1.0);
 }
@@ -231,7 +256,7 @@ void expect_continuous(const F& row_at, double from, double to) {
 }
 
 Vec3 row_of(const Vec3& n, const Patch& p, const BlindDirections& b, const NoiseAwareConfig& c) {
-    const CleanedRow row = cleaned_row(n, p, b, c);
+    const CleanedRow row = cleaned(n, p, b, c);
     return row.weight * row.normal;
 }
 

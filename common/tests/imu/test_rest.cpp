@@ -198,16 +198,29 @@ TEST(RestDetector, ScansWithoutSamplesChangeNothing) {
     EXPECT_EQ(with.accel_variance(), without.accel_variance());
 }
 
-TEST(RestDetector, ContradictedItStaysAwakeAndKeepsWhatItLearnt) {
-    Imu imu(7);
-    RestDetector rest = rested(imu, 50);
-    const double known = rest.gyro_variance();
-    rest.contradict();
+TEST(RestDetector, ShakingIsNoRest) {
+    for (const double times : {1.0, 10.0}) {
+        Imu imu(7), hand(7);
+        imu.accel_noise *= times;  // 0.3 m/s^2: a car on a road
+        hand.gyro_noise *= 2.0 * times;
+        EXPECT_EQ(rested(imu, 30).resting(), times == 1.0);
+        EXPECT_EQ(rested(hand, 30).resting(), times == 1.0);
+    }
+}
+
+TEST(RestDetector, ReadingsWithoutNoiseRestAndAreNotTakenAtTheirWord) {
+    Imu imu(8);
+    imu.gyro_noise = imu.accel_noise = 0.0;
+    RestDetector rest = rested(imu, 30);
+    ASSERT_TRUE(rest.resting());
+    ASSERT_TRUE(rest.knows_noise());
+    EXPECT_GT(rest.noise(1.0).gyro, 1e-7);
+    EXPECT_GT(rest.noise(1.0).accel, 1e-5);
+    const double start = imu.t;
+    for (int i = 0; i < 10; ++i) {
+        rest.add(imu.scan([start](double t) { return 0.5 * (t - start); }, Imu::still));
+    }
     EXPECT_FALSE(rest.resting());
-    for (int i = 0; i < 50; ++i) rest.add(imu.scan());
-    EXPECT_FALSE(rest.resting());
-    EXPECT_EQ(rest.gyro_variance(), known);
-    EXPECT_TRUE(rest.knows_noise());
     rest.reset();
     EXPECT_TRUE(rest.resting());
     EXPECT_FALSE(rest.knows_noise());

@@ -31,7 +31,7 @@ Mat3 gram(const StridedRows& A) {
 
 /// A filter that did not begin at rest knows its velocity from the scans alone: it gets all of them
 /// while it learns it.
-constexpr int kSettlingScans = 20, kRestingScans = 5;
+constexpr int kSettlingScans = 20;
 
 }  // namespace
 
@@ -40,13 +40,15 @@ struct Adapter::Impl {
     int position_index = 0, rotation_index = 3;
     PriorBlock rows{};
     double variance = 0.0;
-    int scans = 0, rested = 0;  ///< since the last reset
-    bool at_rest = false;
+    int scans = 0;                      ///< since the last reset
+    bool rested = false;                ///< one of them
+    bool at_rest = false;               ///< this one
     std::vector<std::size_t> accepted;  ///< the points behind the rows, in order
+    std::vector<Vec3> proven;           ///< shares of the rows
 
     bool read(const ScanInput& input, Core& core);
     void copy_rows(const PriorRows& rows);
-    bool settled() const { return scans > kSettlingScans || rested > kRestingScans; }
+    bool settled() const { return rested || scans > kSettlingScans; }
     void clean(const Rows& rows, const Pose& x, Core& core);
     Status remove_prior(double* covariance, int size) const;
 };
@@ -98,7 +100,7 @@ Status Adapter::begin_scan(const ScanInput& input) {
     impl_->rows = PriorBlock{};
     ++impl_->scans;
     impl_->at_rest = input.at_rest;
-    if (input.at_rest) ++impl_->rested;
+    impl_->rested = impl_->rested || input.at_rest;
     const bool usable = impl_->read(input, core());
     impl_->gate.begin_scan(input.points, core().predicted.t, core().degeneracy.cleans_rows());
     return core().begin(usable, to_pose(input.previous));
@@ -135,11 +137,18 @@ void Adapter::Impl::clean(const Rows& rows, const Pose& x, Core& core) {
     const NoiseAwareConfig& config = core.degeneracy.noise_aware;
     const BlindDirections blind = core.find_blind(sums);
     if (blind.count == 0 || at_rest || !settled()) return;
+    proven.resize(accepted.size());
+    ProvenSum sum;
+    for (std::size_t k = 0; k < accepted.size(); ++k) {
+        const Vec3 n = A_t.row(static_cast<Eigen::Index>(k));
+        proven[k] = proven_share(n, gate.patch(accepted[k]), blind, config);
+        sum.add(n, proven[k], blind);
+    }
     for (std::size_t k = 0; k < accepted.size(); ++k) {
         const std::size_t i = accepted[k];
         const auto row = static_cast<Eigen::Index>(k);
         const Vec3 n = A_t.row(row);
-        const CleanedRow cleaned = cleaned_row(n, gate.patch(i), blind, config);
+        const CleanedRow cleaned = cleaned_row(n, proven[k], blind, sum);
         if (cleaned.normal == n && cleaned.weight == 1.0) continue;
         const Vec3 p_imu = x.R.transpose() * (gate.point(i).cast<double>() - x.t);
         const Vec3 kept = cleaned.weight * cleaned.normal;
@@ -194,7 +203,8 @@ Status Adapter::end_scan(const PoseView& posterior, bool converged, double* cova
 void Adapter::reset() {
     Plugin::reset();
     impl_->gate.reset();
-    impl_->scans = impl_->rested = 0;
+    impl_->scans = 0;
+    impl_->rested = false;
 }
 
 std::size_t Adapter::verdict_count() const { return impl_->gate.book().size(); }

@@ -3,7 +3,7 @@
 #include "d2lio/fastlio/host.hpp"
 
 #include "d2lio/fastlio/adapter.hpp"
-#include "d2lio/host/rest_place.hpp"
+#include "d2lio/host/rest_start.hpp"
 #include "d2lio/host/stop_watch.hpp"
 #include "d2lio/imu/hold.hpp"
 #include "d2lio/preprocess/voxel_grid.hpp"
@@ -30,6 +30,11 @@ HostConfig load(const ParamMap& params, int threads, Adapter& adapter) {
     finish_configuration(adapter, config.filter_size_map);
     return config;
 }
+
+struct Prediction {
+    NavState x;
+    Mat23x23 P;
+};
 
 IeskfOptions filter_options(const HostConfig& c) {
     IeskfOptions o;
@@ -63,6 +68,7 @@ class Host::Impl {
     Ieskf ieskf_;
     ScanMatcher matcher_;
     VoxelGrid voxel_grid_{static_cast<float>(config_.filter_size_surf)};
+    RestStart rest_;
     std::size_t resets_ = 0;
     bool matched_ = false;                      ///< the last scan met the adapter
     std::vector<Eigen::Vector3f> downsampled_;  ///< LiDAR frame at scan end
@@ -77,14 +83,12 @@ class Host::Impl {
     void judge(UpdateStatus status, ScanResult& r);
     bool predict(MeasureGroup& group, ScanResult& r);
     void start_map(ScanResult& r);
-    void update(const Pose& previous, ScanResult& r);
-    void hold(const NavState& predicted, const Mat23x23& P);
-    bool held() const { return adapter_.starts_at_rest() && imu_.resting(); }
-    void average_map(ScanResult& r);
+    bool update(const Pose& previous, ScanResult& r);
+    void rest_on(const Prediction* before, bool updated, const ScanDiagnostics& scan);
+    void collect_rest(ScanResult& r);
     void grow_map(const MeasureGroup& group, ScanResult& r);
     void finish(ScanResult& r) const;
 
-    RestPlace rest_;
     RestCloud rest_cloud_;  ///< map frame
     bool first_scan_ = true;
     int failures_ = 0;  ///< refused updates in a row
@@ -99,6 +103,8 @@ void Host::Impl::begin_epoch() {
     imu_.reset();
     map_.clear();
     adapter_.reset();
+    rest_.reset();
+    rest_cloud_.clear();
 }
 
 std::optional<ScanResult> Host::Impl::step() {
@@ -117,8 +123,9 @@ std::optional<ScanResult> Host::Impl::step() {
 void Host::Impl::process(MeasureGroup& group, ScanResult& r) {
     if (start_up(group, r)) return;
     const Pose previous = x_.T_map_imu();
-    if (adapter_.starts_at_rest()) imu_.watch_rest(group.imu);
+    if (adapter_.starts_at_rest()) rest_.watch(group.imu);
     if (!predict(group, r)) return;
+    rest_.record(imu_.steps());
     map_.follow(x_.T_map_lidar().t);
     voxel_grid_.filter(cloud_, downsampled_);
     r.points_downsampled = downsampled_.size();
@@ -133,12 +140,8 @@ void Host::Impl::process(MeasureGroup& group, ScanResult& r) {
         r.health = Health::kLost;
         return;
     }
-    update(previous, r);
-    if (held()) {
-        average_map(r);
-        return;
-    }
-    rest_cloud_.finish();
+    if (update(previous, r)) return;
+    if (!rest_.watched()) rest_cloud_.clear();
     if (r.status != ScanStatus::kNumericalFailure) grow_map(group, r);
 }
 
@@ -193,15 +196,19 @@ void Host::Impl::start_map(ScanResult& r) {
         r.has_pose = false;
         return;
     }
-    rest_.pose = x_.T_map_imu();
     matcher_.begin(downsampled_, map_.tree());
-    rest_cloud_.start(matcher_.to_map(x_));
-    map_.build(matcher_.to_map(x_));
+    const std::vector<Eigen::Vector3f>& points = matcher_.to_map(x_);
+    map_.build(points);
+    if (adapter_.starts_at_rest()) {
+        rest_.begin(x_, P_);
+        rest_cloud_.add(points);
+    }
     r.status = ScanStatus::kMapInitialised;
     r.times.map = watch_.lap();
 }
 
-void Host::Impl::update(const Pose& previous, ScanResult& r) {
+/// @returns whether the pose was held: then the map has been seen to.
+bool Host::Impl::update(const Pose& previous, ScanResult& r) {
     const Pose predicted = x_.T_map_imu();
     const ScanInput input{{previous.R.data(), previous.t.data()},
                           {predicted.R.data(), predicted.t.data()},
@@ -210,9 +217,9 @@ void Host::Impl::update(const Pose& previous, ScanResult& r) {
                           StateIndex::kPos,
                           StateIndex::kRot,
                           downsampled_.size(),
-                          held()};
-    const NavState before = x_;
-    const Mat23x23 P_before = P_;
+                          rest_.held()};
+    std::optional<Prediction> before;
+    if (rest_.held()) before = Prediction{x_, P_};
     adapter_.begin_scan(input);
     matched_ = true;
     matcher_.begin(downsampled_, map_.tree());
@@ -227,24 +234,39 @@ void Host::Impl::update(const Pose& previous, ScanResult& r) {
     r.diagnostics = adapter_.diagnostics();
     r.diagnostics.iterations = report.iterations;
     judge(report.status, r);
-    if (held()) {
-        if (updated && rest_.left(x_.T_map_imu(), r.diagnostics)) imu_.end_rest();
-        if (held()) hold(before, P_before);
-    }
+    rest_on(before ? &*before : nullptr, updated, r.diagnostics);
     r.times.search = matcher_.search_ms();
     r.times.update = watch_.lap() - r.times.search;
+    if (rest_.watched() || rest_.held()) collect_rest(r);
+    return rest_.held();
 }
 
 /// At rest the pose is that of the start and the velocity zero, which teaches the filter its biases
 /// and gravity; what the scan would say of the pose is only the noise of its match.
-void Host::Impl::hold(const NavState& predicted, const Mat23x23& P) {
-    x_ = predicted;
-    P_ = P;
-    hold_still(rest_.pose, x_, P_);
+/// @param before the prediction, where the pose was held until now.
+void Host::Impl::rest_on(const Prediction* before, bool updated, const ScanDiagnostics& scan) {
+    switch (updated ? rest_.judge(x_.T_map_imu(), scan) : RestStart::Event::kNothing) {
+        case RestStart::Event::kConfirmed:
+            rest_.replay(imu_.accel_scale(), config_.exact_jacobians, x_, P_);
+            break;
+        case RestStart::Event::kContradicted:
+            reopen(P_);
+            return;
+        case RestStart::Event::kNothing:
+            if (!rest_.held()) return;
+            x_ = before->x;
+            P_ = before->P;
+            hold_still(rest_.pose(), x_, P_);
+    }
+    imu_.expect(*rest_.noise(imu_.accel_scale()));
 }
 
-void Host::Impl::average_map(ScanResult& r) {
-    if (!rest_cloud_.add(matcher_.to_map(x_))) return;
+/// The map at rest is the mean of its scans, all taken at one pose.
+void Host::Impl::collect_rest(ScanResult& r) {
+    NavState at_rest = x_;
+    at_rest.pos = rest_.pose().t;
+    at_rest.rot = rest_.pose().R;
+    if (!rest_cloud_.add(matcher_.to_map(at_rest)) || !rest_.held()) return;
     map_.clear();
     map_.build(rest_cloud_.mean(config_.filter_size_map));
     r.times.map = watch_.lap();
@@ -308,7 +330,7 @@ std::optional<ScanResult> Host::step() { return impl_->step(); }
 void Host::reconfigure(const ParamMap& changes) {
     Adapter scratch;
     d2lio::reconfigure(changes, scratch, impl_->adapter_, impl_->params_);
-    if (!impl_->map_.empty()) impl_->imu_.end_rest();  // what began meanwhile was not watched
+    if (!impl_->map_.empty()) impl_->rest_.end();  // what began meanwhile was not watched
 }
 
 std::vector<Eigen::Vector3f> Host::scan_points() const {

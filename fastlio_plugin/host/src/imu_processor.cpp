@@ -23,15 +23,7 @@ void ImuProcessor::reset() {
     initialised_ = false;
     start_.reset();
     stepper_.reset();
-    rest_.reset();
     Q_ = configured_Q_;
-}
-
-void ImuProcessor::watch_rest(const std::vector<ImuSample>& samples) {
-    if (!rest_.resting()) return;
-    rest_.add(samples);
-    if (!rest_.knows_noise()) return;
-    Q_ = rest_.noise(accel_scale_).matrix();
 }
 
 bool ImuProcessor::initialise(const std::vector<ImuSample>& samples, NavState& x, Mat23x23& P) {

@@ -7,7 +7,6 @@
 
 #include "d2lio/fastlio/config.hpp"
 #include "d2lio/host/imu_intake.hpp"
-#include "d2lio/imu/rest.hpp"
 
 namespace d2lio::fastlio {
 
@@ -29,11 +28,11 @@ class ImuProcessor {
     const std::string& note() const { return start_.note(); }
     /// Mean period of the samples used so far, s; 0 before any.
     double mean_period() const { return stepper_.mean_period(); }
-    /// Learns whether the body rests, and from its rest the noise of both sensors (method
-    /// noise_aware); the configured noise holds until then.
-    void watch_rest(const std::vector<ImuSample>& samples);
-    bool resting() const { return rest_.resting(); }
-    void end_rest() { rest_.contradict(); }
+    /// Inputs of the last propagate().
+    const std::vector<ImuStep>& steps() const { return stepper_.steps(); }
+    double accel_scale() const { return accel_scale_; }  ///< readings to m/s^2
+    /// Noise from here on instead of the configured one.
+    void expect(const ProcessNoise& noise) { Q_ = noise.matrix(); }
     void reset();
 
   private:
@@ -44,8 +43,7 @@ class ImuProcessor {
     ImuStart start_;
     ImuStepper stepper_;
     std::vector<MotionKnot> knots_;
-    RestDetector rest_;
-    double accel_scale_ = 1.0;  ///< readings to m/s^2
+    double accel_scale_ = 1.0;
 };
 
 }  // namespace d2lio::fastlio

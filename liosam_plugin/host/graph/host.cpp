@@ -43,6 +43,8 @@ Host::Impl::Impl(Preset preset, const ParamMap& params, int threads)
 
 void Host::Impl::begin_epoch() {
     predictor_.reset();
+    rest_corners_.clear();
+    rest_surfaces_.clear();
     matcher_.reset();
     map_.clear();
     keyframes_.clear();
@@ -94,14 +96,12 @@ void Host::Impl::process(MeasureGroup& group, ScanResult& r) {
         return;
     }
     r.has_pose = true;
-    const bool held = filters() && adapter_.starts_at_rest() && predictor_.resting();
-    matcher_.set_resting(held);
+    matcher_.set_resting(predictor_.rest().held());
     const Pose estimate = match(r);
     if (filters()) {
-        if (fuse(estimate, held, r)) {
-            average_map(group, r);
-            return;
-        }
+        fuse(estimate, r);
+        collect_rest(group, r);
+        if (predictor_.rest().held()) return;
     } else {
         correct(estimate, r);
     }
@@ -177,11 +177,9 @@ void Host::Impl::start_map(const MeasureGroup& group, ScanResult& r) {
     }
     const NavState& x = predictor_.state();
     previous_ = x.T_map_imu();
-    rest_.pose = previous_;
-    rest_corners_.start(cloud_.corners);
-    rest_surfaces_.start(cloud_.surfaces);
     if (filters()) {
-        predictor_.start_filter();
+        predictor_.start_filter(adapter_.starts_at_rest());
+        collect_rest(group, r);
         covariance_ = matched_covariance_ = start_covariance();
         r.has_pose = true;
         health_ = Health::kOk;

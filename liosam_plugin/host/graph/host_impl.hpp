@@ -3,7 +3,6 @@
 #pragma once
 
 #include "config.hpp"
-#include "d2lio/host/rest_place.hpp"
 #include "d2lio/host/stop_watch.hpp"
 #include "d2lio/liosam/host.hpp"
 #include "front_end.hpp"
@@ -52,8 +51,8 @@ class Host::Impl {
     /// Method noise_aware: pose, velocity and biases are one filter's, and the inertial graph
     /// rests.
     bool filters() const { return adapter_.reads_surfaces(); }
-    bool fuse(const Pose& estimate, bool held, ScanResult& r);
-    void average_map(const MeasureGroup& group, ScanResult& r);
+    void fuse(const Pose& estimate, ScanResult& r);
+    void collect_rest(const MeasureGroup& group, ScanResult& r);
     void grow_map(const MeasureGroup& group, ScanResult& r);
     void close_loop(ScanResult& r);
     void begin_epoch();
@@ -66,7 +65,6 @@ class Host::Impl {
 
     MatchCloud cloud_;
     std::vector<LidarPoint> raw_;
-    RestPlace rest_;
     RestCloud rest_corners_, rest_surfaces_;  ///< IMU frame
     Pose previous_;                           ///< last estimate, T_map_imu
     Pose loop_correction_;  ///< of all loops: T_map_odometry; the inertial graph lives in odometry

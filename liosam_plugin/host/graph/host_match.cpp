@@ -94,28 +94,26 @@ void Host::Impl::correct(const Pose& estimate, ScanResult& r) {
     previous_ = estimate;
 }
 
-/// @returns whether the pose was held.
-bool Host::Impl::fuse(const Pose& estimate, bool held, ScanResult& r) {
-    if (held && matched() && rest_.left(estimate, r.diagnostics)) {
-        predictor_.end_rest();
-        held = false;
-    }
-    if (held) {
-        predictor_.hold(rest_.pose);
-    } else if (matched()) {
-        predictor_.fuse(estimate, covariance_);
-    }
+void Host::Impl::fuse(const Pose& estimate, ScanResult& r) {
+    const bool held = predictor_.hold(estimate, matched(), r.diagnostics);
+    if (!held && matched()) predictor_.fuse(estimate, covariance_);
     previous_ = predictor_.state().T_map_imu();
     covariance_ = predictor_.covariance();
-    return held;
 }
 
 /// The first keyframe is the mean of the scans at rest.
-void Host::Impl::average_map(const MeasureGroup& group, ScanResult& r) {
-    if (map_.size() != 1 || !rest_surfaces_.add(cloud_.surfaces)) return;
+void Host::Impl::collect_rest(const MeasureGroup& group, ScanResult& r) {
+    const RestStart& rest = predictor_.rest();
+    if (!rest.watched() && !rest.held()) {
+        rest_corners_.clear();
+        rest_surfaces_.clear();
+        return;
+    }
+    if (!rest_surfaces_.add(cloud_.surfaces)) return;
     rest_corners_.add(cloud_.corners);
+    if (!rest.held() || map_.size() != 1) return;
     map_.clear();
-    map_.add(rest_.pose, group.end, rest_corners_.mean(config_.corner_leaf),
+    map_.add(rest.pose(), group.end, rest_corners_.mean(config_.corner_leaf),
              rest_surfaces_.mean(surface_leaf()));
     r.times.map = watch_.lap();
 }

@@ -62,11 +62,25 @@ void Predictor::reset() {
     rest_.reset();
 }
 
-void Predictor::start_filter() { P_ = d2lio::start_covariance(); }
+void Predictor::start_filter(bool rests) {
+    P_ = d2lio::start_covariance();
+    if (rests) rest_.begin(x_, P_);
+}
 
-void Predictor::hold(const Pose& rest) {
-    hold_still(rest, x_, P_);
+bool Predictor::hold(const Pose& estimate, bool matched, const ScanDiagnostics& scan) {
+    switch (matched ? rest_.judge(estimate, scan) : RestStart::Event::kNothing) {
+        case RestStart::Event::kConfirmed:
+            rest_.replay(accel_scale_, true, x_, P_);
+            break;
+        case RestStart::Event::kContradicted:
+            reopen(P_);
+            return false;
+        case RestStart::Event::kNothing:
+            if (!rest_.held()) return false;
+            hold_still(rest_.pose(), x_, P_);
+    }
     steps_.clear();
+    return true;
 }
 
 /// With the pose's error a and the others' b, jointly normal: b follows by P_ba P_aa^-1 a, and its
@@ -130,7 +144,7 @@ std::optional<Mat3> Predictor::orientation() const {
 
 /// Densities as covariances per step, which enter propagate() as dt^2 Q.
 Mat12 Predictor::noise_over(double dt, double scale) const {
-    if (rest_.knows_noise()) return scale * rest_.noise(accel_scale_).matrix();
+    if (const auto measured = rest_.noise(accel_scale_)) return scale * measured->matrix();
     const ImuGraphOptions& n = config_.imu;
     const double per_step = scale / std::max(dt, kShortestStep);
     const auto variance = [per_step](double density) { return density * density * per_step; };
@@ -144,6 +158,7 @@ Mat12 Predictor::noise_over(double dt, double scale) const {
 
 void Predictor::advance(const MeasureGroup& group, double noise_scale) {
     const std::vector<ImuStep>& steps = stepper_.cut(group);
+    rest_.record(steps);
     const double first = steps.front().offset - steps.front().dt;
     knots_.clear();
     knots_.push_back(motion_knot(std::min(first, kBeforeScan), x_, ImuInput{}));

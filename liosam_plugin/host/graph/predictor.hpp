@@ -7,7 +7,7 @@
 
 #include "config.hpp"
 #include "d2lio/host/imu_intake.hpp"
-#include "d2lio/imu/rest.hpp"
+#include "d2lio/host/rest_start.hpp"
 #include "imu_graph.hpp"
 
 namespace d2lio::liosam {
@@ -37,16 +37,16 @@ class Predictor {
     /// and gravity follow by what they share with the pose, as in a Kalman filter.
     /// @param covariance of the estimate, absolute in the map; rotation (body), position (map).
     void fuse(const Pose& T_map_imu, const Mat6& covariance);
-    /// At rest: holds the pose, see hold_still().
-    void hold(const Pose& rest);
     /// Turns and moves everything with a pose that a loop has moved.
     void move(const Pose& correction);
-    /// Learns whether the body rests, and the sensors' noise from its rest.
-    void watch_rest(const std::vector<ImuSample>& samples) { rest_.add(samples); }
-    bool resting() const { return rest_.resting(); }
-    void end_rest() { rest_.contradict(); }
     /// Keeps the covariance of the start (method noise_aware): the pose's grows from there on.
-    void start_filter();
+    /// @param rests whether the run may begin at rest.
+    void start_filter(bool rests);
+    void watch_rest(const std::vector<ImuSample>& samples) { rest_.watch(samples); }
+    /// Where the run began at rest, and rests still, holds the pose; see RestStart.
+    /// @param matched whether the estimate comes from the scan. @returns whether it is held.
+    bool hold(const Pose& estimate, bool matched, const ScanDiagnostics& scan);
+    const RestStart& rest() const { return rest_; }
 
     const NavState& state() const { return x_; }
     /// 6x6 of the pose relative to the last matched one: rotation (right, body), position (map).
@@ -76,7 +76,7 @@ class Predictor {
     Mat23x23 P_ = Mat23x23::Zero();
     std::vector<MotionKnot> knots_;
     std::vector<ImuStep> steps_;
-    RestDetector rest_;
+    RestStart rest_;
     double accel_scale_ = 1.0;  ///< readings to m/s^2
 };
 

@@ -146,19 +146,24 @@ void ScanToMap::clean(const Pose& T) {
     SurfaceSums sums;
     for (std::size_t i = 0; i < rows_.size(); ++i) {
         const Row& row = rows_[i];
-        if (row.used && row.has_patch) sums.add(row.jacobian.tail<3>() / row.weight, patches_[i]);
+        if (row.used && row.has_patch) sums.add(row.normal(), patches_[i]);
     }
     const BlindDirections blind = adapter_.find_blind(sums);
     if (blind.count == 0 || resting_) return;
-    Patch unproven;
-    unproven.doubt = Eigen::Vector3f::Constant(kInfinity);
+    proven_.assign(rows_.size(), Vec3::Zero());
+    ProvenSum sum;
+    for (std::size_t i = 0; i < rows_.size(); ++i) {
+        if (!rows_[i].used || !rows_[i].has_patch) continue;
+        const Vec3 n = rows_[i].normal();
+        proven_[i] = proven_share(n, patches_[i], blind, adapter_.noise_aware());
+        sum.add(n, proven_[i], blind);
+    }
     int cleaned = 0;
     for (std::size_t i = 0; i < rows_.size(); ++i) {
         Row& row = rows_[i];
         if (!row.used) continue;
-        const Vec3 n = row.jacobian.tail<3>() / row.weight;
-        const CleanedRow out =
-            cleaned_row(n, row.has_patch ? patches_[i] : unproven, blind, adapter_.noise_aware());
+        const Vec3 n = row.normal();
+        const CleanedRow out = cleaned_row(n, proven_[i], blind, sum);
         if (out.normal == n && out.weight == 1.0) continue;
         const Vec3 kept = row.weight * out.weight * out.normal;
         row.jacobian << row.p.cross(T.R.transpose() * kept), kept;

@@ -77,6 +77,8 @@ class ScanToMap {
         double weight = 1.0;     ///< contained in both
         bool has_patch = false;  ///< a plane's row; lines have none
         Vec3 p = Vec3::Zero();   ///< the point, body frame, m
+
+        Vec3 normal() const { return jacobian.tail<3>() / weight; }  ///< map frame
     };
     /// The last search of a feature: the next one need look no farther than its neighbours are now.
     struct Memory {
@@ -113,6 +115,7 @@ class ScanToMap {
     Mat6 keep_ = Mat6::Identity();
     bool resting_ = false;
     std::vector<Patch> patches_;  ///< of the rows; only while the adapter reads surfaces
+    std::vector<Vec3> proven_;    ///< shares of the rows along the blind directions
     BendField bends_;
     Eigen::Vector3f sensor_ = Eigen::Vector3f::Zero();  ///< map frame
     const Mat6* prior_ = nullptr;                       ///< of the scan being aligned

@@ -9,8 +9,8 @@ namespace d2lio {
 
 /// Parameters of method noise_aware.
 struct NoiseAwareConfig {
-    double share_low = 0.15;    ///< of noise in a direction's information: below, nothing is done
-    double share_high = 0.3;    ///< above, every row has to prove itself
+    double share_low = 0.2;     ///< of noise in a direction's information: below, nothing is done
+    double share_high = 0.4;    ///< above, every row has to prove itself
     double significance = 6.0;  ///< sigmas by which a row's component must exceed its noise
 };
 
@@ -19,6 +19,17 @@ struct BlindDirections {
     int count = 0;
     Mat3 axes = Mat3::Identity();  ///< columns, map frame, orthonormal; the first `count` matter
     Vec3 blend = Vec3::Zero();     ///< 0: leave the rows alone, 1: clean them
+};
+
+/// How much of a row's components along the blind directions exceeds their noise: 0 none, 1 all.
+Vec3 proven_share(const Vec3& normal, const Patch& patch, const BlindDirections& blind,
+                  const NoiseAwareConfig& config);
+
+/// Information along the blind directions that has proven itself, summed over the rows.
+struct ProvenSum {
+    Vec3 information = Vec3::Zero();  ///< along each blind axis
+
+    void add(const Vec3& normal, const Vec3& share, const BlindDirections& blind);
 };
 
 /// Sums over the accepted rows; see noise_share().
@@ -50,10 +61,11 @@ struct CleanedRow {
 /// stays as it is: at the point of linearisation the neighbours lie beside the point, wherever that
 /// is along the blind direction.
 ///
-/// What proves itself gets half the weight, down from a component of about 0.05 on: a blind
-/// direction hangs on a few surfaces that scan after scan sees again, with the same error each
-/// time.
-CleanedRow cleaned_row(const Vec3& normal, const Patch& patch, const BlindDirections& blind,
-                       const NoiseAwareConfig& config);
+/// Where a direction hangs on a few proven rows, they get half the weight, down from a component of
+/// about 0.05 on: scan after scan sees the same few surfaces, with the same error each time. Among
+/// many that averages out.
+/// @param share of proven_share(). @param sum over all rows of the scan.
+CleanedRow cleaned_row(const Vec3& normal, const Vec3& share, const BlindDirections& blind,
+                       const ProvenSum& sum);
 
 }  // namespace d2lio

@@ -58,6 +58,7 @@ class ImuStepper {
     /// One step per sample used, and one more (of length >= 0) to the scan's end. Without an
     /// earlier scan the steps begin at the newest sample of start().
     const std::vector<ImuStep>& cut(const MeasureGroup& group);
+    const std::vector<ImuStep>& steps() const { return steps_; }  ///< of the last cut()
     /// Mean period of the samples used so far, s; 0 before any.
     double mean_period() const { return intervals_ > 0 ? interval_sum_ / intervals_ : 0.0; }
     const ImuSample& newest() const { return last_; }

@@ -14,16 +14,14 @@ namespace d2lio {
 /// noisy they are meanwhile.
 ///
 /// The means of the newest half second, and of every shorter stretch up to now, are compared with
-/// those of everything before: 5.5 sigma of white noise on any of the six axes is motion. (A scan
-/// cannot tell: where it sees nothing along an axis, standing and moving look the same.) Motion at
-/// constant speed from the first sample on cannot be told from rest; see contradict().
+/// those of everything before: 5.5 sigma of white noise on any of the six axes is motion, and so is
+/// shaking beyond 0.015 g or 0.02 rad/s (standard deviations; an idling engine may pass, a drive on
+/// a road or a hand does not). Smooth motion at constant speed from the first sample on cannot be
+/// told from rest.
 class RestDetector {
   public:
     /// One scan's samples, in order.
     void add(const std::vector<ImuSample>& samples);
-    /// The scan saw the body move.
-    void contradict() { resting_ = false; }
-
     bool resting() const { return resting_; }
     /// Whether enough samples of rest have been seen for the noise to be known.
     bool knows_noise() const;
@@ -31,7 +29,8 @@ class RestDetector {
     double gyro_variance() const;
     double accel_variance() const;
     /// Noise to expect in motion, from that at rest: four times the variances (vibration, scale
-    /// errors), and bias walks in proportion. Only where knows_noise().
+    /// errors), and bias walks in proportion; not below a tactical-grade sensor's. Only where
+    /// knows_noise().
     /// @param accel_scale readings to m/s^2.
     ProcessNoise noise(double accel_scale) const;
     void reset() { *this = RestDetector(); }
@@ -46,6 +45,9 @@ class RestDetector {
     static Block block_of(const std::vector<ImuSample>& samples);
     void merge(const Block& block);
     bool moves() const;
+    bool shakes() const;
+    double gravity_squared() const;
+    double least_accel() const;  ///< variance
 
     bool resting_ = true;
     Block past_;
