@@ -85,7 +85,7 @@ SCENES = (
     Scene("room", "Room", None),
 )
 # The whole ablation on the FAST-LIO2 host; of the others what shows the step from LIO-SAM as it is
-# to D2-LIO as it is, whose defaults are point_adaptive and paper; then noise_aware.
+# to D2-LIO as it is, whose defaults are point_adaptive and noise_aware.
 VARIANTS = (
     *(
         Variant(rejection, degeneracy)

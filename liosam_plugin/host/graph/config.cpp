@@ -27,7 +27,7 @@ HostConfig::HostConfig(Preset preset) {
 
 ParamMap adapter_defaults(Preset preset) {
     if (preset == Preset::kLioSam) return {};
-    return {{"rejection.mode", "point_adaptive"}, {"degeneracy.method", "paper"}};
+    return {{"rejection.mode", "point_adaptive"}, {"degeneracy.method", "noise_aware"}};
 }
 
 void HostConfig::bind(ParamTable& t) {

@@ -204,7 +204,7 @@ TEST(LioSamHost, PresetsDifferInTheirDefaultsOnly) {
     EXPECT_EQ(d2lio["front_end"], "direct");
     EXPECT_EQ(liosam["rejection.mode"], "off");
     EXPECT_EQ(d2lio["rejection.mode"], "point_adaptive");
-    EXPECT_EQ(d2lio["degeneracy.method"], "paper");
+    EXPECT_EQ(d2lio["degeneracy.method"], "noise_aware");
     EXPECT_EQ(liosam["mappingProcessInterval"], "0.15");
 }
 

@@ -11,7 +11,7 @@ namespace {
 constexpr int kFirstLost = 20;
 
 /// The drive, with the scans from kFirstLost on, `lost` of them, nowhere near the map.
-std::vector<ScanResult> lose(Preset preset, int lost) {
+std::vector<ScanResult> lose(Preset preset, int lost, const ParamMap& params = {}) {
     test::Drive drive;
     drive.scans = kFirstLost + lost + 6;
     drive.edit = [lost](int i, Scan& s) {
@@ -22,7 +22,7 @@ std::vector<ScanResult> lose(Preset preset, int lost) {
         }
         return true;
     };
-    return test::run(preset, {}, 1, drive);
+    return test::run(preset, params, 1, drive);
 }
 
 /// @returns how many skipped scans had the health `wanted`.
@@ -70,7 +70,7 @@ struct AfterLoss {
 };
 
 AfterLoss after_loss(int lost) {
-    const auto results = lose(Preset::kD2Lio, lost);
+    const auto results = lose(Preset::kD2Lio, lost, {{"degeneracy.method", "paper"}});
     const auto first = static_cast<std::size_t>(kFirstLost + lost);
     for (std::size_t i = kFirstLost; i < results.size(); ++i) {
         EXPECT_EQ(results[i].status == ScanStatus::kOk, i >= first) << "scan " << i;

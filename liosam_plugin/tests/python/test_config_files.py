@@ -50,7 +50,7 @@ def test_it_describes_the_sensor(name: str) -> None:
     assert params["point_filter_num"] == "1"
     assert params["rejection.mode"] == "off"
     d2lio = source_params(config, "d2lio")
-    assert (d2lio["front_end"], d2lio["degeneracy.method"]) == ("direct", "paper")
+    assert (d2lio["front_end"], d2lio["degeneracy.method"]) == ("direct", "noise_aware")
 
 
 @pytest.mark.parametrize("host", host_params(("liosam", "d2lio")))

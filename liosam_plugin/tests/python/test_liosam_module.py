@@ -76,7 +76,7 @@ def test_presets() -> None:
     assert list(liosam) == list(d2lio)
     assert (liosam["front_end"], d2lio["front_end"]) == ("features", "direct")
     assert (liosam["rejection.mode"], d2lio["rejection.mode"]) == ("off", "point_adaptive")
-    assert (liosam["degeneracy.method"], d2lio["degeneracy.method"]) == ("none", "paper")
+    assert (liosam["degeneracy.method"], d2lio["degeneracy.method"]) == ("none", "noise_aware")
     assert float(liosam["mappingProcessInterval"]) == 0.15
     assert float(liosam["preprocess.blind"]) == 1.0
 

@@ -9,7 +9,7 @@ from typing import NamedTuple
 MODES = ("off", "none", "fixed", "kiss", "point_adaptive")
 FULL = "d2"
 FULL_MODE = "point_adaptive"
-DEFAULT_DEGENERACY = "noise_aware"  # the method to try first: what `d2` adds to FULL_MODE
+DEFAULT_DEGENERACY = "noise_aware"  # the project's default method: what `d2` adds to FULL_MODE
 HOSTS = ("fastlio", "liosam", "d2lio")
 HOST_TITLES = {"fastlio": "FAST-LIO2", "liosam": "LIO-SAM", "d2lio": "D²-LIO"}
 UPSTREAM_HOST = "upstream"
