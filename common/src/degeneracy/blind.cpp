@@ -36,10 +36,18 @@ Vec3 rest_of(Vec3 axis, const BlindDirections& blind, int count) {
 }  // namespace
 
 void SurfaceSums::add(const Vec3& normal, const Patch& patch) {
-    const Vec3 a = patch.s1.cast<double>(), b = patch.s2.cast<double>();
-    information.noalias() += normal * normal.transpose();
-    noise.noalias() += a * a.transpose();
-    noise.noalias() += b * b.transpose();
+    const double x = normal.x(), y = normal.y(), z = normal.z();
+    const Upper n{x * x, x * y, x * z, y * y, y * z, z * z};
+    for (std::size_t i = 0; i < n.size(); ++i) {
+        n_[i] += n[i];
+        c_[i] += static_cast<double>(patch.covariance[i]);
+    }
+}
+
+Mat3 SurfaceSums::symmetric(const Upper& u) {
+    Mat3 m;
+    m << u[0], u[1], u[2], u[1], u[3], u[4], u[2], u[4], u[5];
+    return m;
 }
 
 BlindDirections find_blind(const NoiseShare& share, const Mat3& P_t,

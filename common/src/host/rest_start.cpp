@@ -86,14 +86,14 @@ void reopen(Mat23x23& P) {
     P.diagonal().segment<3>(StateIndex::kVel).array() += kSpeed * kSpeed;
 }
 
-bool RestCloud::add(const std::vector<Eigen::Vector3f>& points) {
-    if (scans_ >= kMostScans) return false;
+void RestCloud::add(const std::vector<Eigen::Vector3f>& points) {
+    if (scans_ >= kMostScans) return;
     ++scans_;
     points_.insert(points_.end(), points.begin(), points.end());
-    return true;
 }
 
-std::vector<Eigen::Vector3f> RestCloud::mean(double leaf) const {
+std::vector<Eigen::Vector3f> RestCloud::mean(double leaf) {
+    taken_ = scans_;
     std::vector<Eigen::Vector3f> out;
     voxel_grid(points_, static_cast<float>(leaf), out);
     return out;

@@ -43,7 +43,7 @@ PriorTerm Plugin::Core::analyse(const Mat3& AtA_r, const Mat3& AtA_t) {
 }
 
 BlindDirections Plugin::Core::find_blind(const SurfaceSums& sums) {
-    const NoiseShare share = noise_share(sums.information, sums.noise);
+    const NoiseShare share = noise_share(sums.information(), sums.noise());
     current.noise_share = share.share;
     current.noise_axes = share.axes;
     const BlindDirections blind = d2lio::find_blind(share, P_t, degeneracy.noise_aware);

@@ -36,8 +36,7 @@ Mat3 long_along_x(double ratio) { return Vec3(1e-4 * ratio, 1e-4, 1e-4).asDiagon
 /// A patch whose normal is uncertain by `sigma` (rad) about y and z.
 Patch uncertain(float sigma) {
     Patch p;
-    p.s1 = {sigma, 0.F, 0.F};
-    p.s2 = {0.F, sigma, 0.F};
+    p.covariance = {sigma * sigma, 0.F, 0.F, sigma * sigma, 0.F, 0.F};
     return p;
 }
 
@@ -60,15 +59,15 @@ Vec3 leaning(double a) { return {a, 0.0, std::sqrt(1.0 - a * a)}; }
 
 TEST(SurfaceSums, AddUpNormalsAndTheirCovariancesWithoutTheDoubt) {
     Patch p = uncertain(0.1F);
-    p.s2 = {0.F, 0.F, 0.2F};
+    p.covariance = {0.01F, 0.F, 0.F, 0.F, 0.F, 0.04F};
     p.doubt = {1.F, 1.F, 1.F};
     SurfaceSums sums;
     sums.add(Vec3::UnitZ(), p);
     sums.add(Vec3(0.6, 0.8, 0.0), p);
     const Mat3 noise = 2.0 * Vec3(0.01, 0.0, 0.04).asDiagonal().toDenseMatrix();
-    EXPECT_LT((sums.noise - noise).norm(), 1e-7);  // of single precision
-    EXPECT_NEAR(sums.information(0, 1), 0.48, kExact);
-    EXPECT_NEAR(sums.information(2, 2), 1.0, kExact);
+    EXPECT_LT((sums.noise() - noise).norm(), 1e-7);  // of single precision
+    EXPECT_NEAR(sums.information()(0, 1), 0.48, kExact);
+    EXPECT_NEAR(sums.information()(2, 2), 1.0, kExact);
 }
 
 TEST(FindBlind, TakesTheLongAxisOfTheFilterInsideTheCone) {
@@ -171,8 +170,7 @@ TEST(CleanedRow, EachBlindDirectionIsJudgedByItself) {
     both.count = 2;
     both.blend[1] = 1.0;
     Patch p;
-    p.s1 = {0.2F, 0.F, 0.F};    // uncertain along x only
-    p.s2 = {0.F, 0.005F, 0.F};  // and well known along y
+    p.covariance = {0.04F, 0.F, 0.F, 25e-6F, 0.F, 0.F};  // uncertain along x only
     const Vec3 n = Vec3(0.3, 0.3, 0.9).normalized();
     const CleanedRow row = cleaned(n, p, both, kConfig);
     EXPECT_NEAR(row.normal.x(), 0.0, kExact);
@@ -185,7 +183,9 @@ TEST(CleanedRow, TheAxisMayPointAnywhere) {
     slanted.axes = Eigen::AngleAxisd(0.7, Vec3(1.0, 2.0, 3.0).normalized()).toRotationMatrix();
     const Vec3 d = slanted.axes.col(0), e = slanted.axes.col(1);
     Patch p;
-    p.s1 = (0.1 * d).cast<float>();
+    const Eigen::Vector3f s = (0.1 * d).cast<float>();
+    p.covariance = {s.x() * s.x(), s.x() * s.y(), s.x() * s.z(),
+                    s.y() * s.y(), s.y() * s.z(), s.z() * s.z()};
     const Vec3 n = 0.2 * d + std::sqrt(0.96) * e;  // two sigma along the axis
     EXPECT_LT((cleaned(n, p, slanted, kConfig).normal - std::sqrt(0.96) * e).norm(), 1e-7);
 }

@@ -6,6 +6,7 @@
 #include <limits>
 #include <set>
 
+#include "d2lio/degeneracy/blind.hpp"
 #include "d2lio/degeneracy/patch.hpp"
 #include "surfaces.hpp"
 
@@ -19,7 +20,7 @@ using test::Surface;
 constexpr double kMonteCarlo = 0.06;   // of a covariance from 8000 draws
 constexpr double kRounding = 2e-3;     // of single precision through an inverse
 constexpr double kSmallAngles = 0.03;  // of heights up to a tenth of the patch's size
-constexpr float kCap = 1.0001F;        // rad
+constexpr double kCap = 1.0001;        // rad
 const float kNotANumber = std::numeric_limits<float>::quiet_NaN();
 
 /// The documented variance of a neighbour's height where the fit leaves nothing.
@@ -29,8 +30,9 @@ double height_variance(double extent) {
 }
 
 Mat3 covariance(const Patch& p) {
-    const Vec3 a = p.s1.cast<double>(), b = p.s2.cast<double>();
-    return a * a.transpose() + b * b.transpose();
+    SurfaceSums sums;
+    sums.add(Vec3::UnitX(), p);
+    return sums.noise();
 }
 
 Eigen::Matrix2d scatter(const Places& places, int without = -1) {
@@ -133,14 +135,13 @@ TEST(Patch, FourPointsOfAScanLineAndOneBesideItAreDoubted) {
 
 TEST(Patch, VarianceAlongADirectionAddsUpAndANormalLostByHalfARadianSaysNothing) {
     Patch p;
-    p.s1 = {0.F, 0.03F, 0.F};
-    p.s2 = {0.F, 0.F, 0.04F};
+    p.covariance = {0.F, 0.F, 0.F, 9e-4F, 0.F, 16e-4F};
     p.doubt = {0.F, 0.05F, 0.F};
     EXPECT_NEAR(p.variance_along(Vec3::UnitY(), 0.0), 0.03 * 0.03 + 0.05 * 0.05, 1e-9);
     EXPECT_NEAR(p.variance_along(Vec3::UnitZ(), 0.0), 0.04 * 0.04, 1e-9);
     EXPECT_GT(1.0 / std::sqrt(p.variance_along(Vec3::UnitX(), 1.0)), 100.0);  // sigmas
     Patch lost;
-    lost.s1 = {0.F, 0.5F, 0.F};
+    lost.covariance[3] = 0.25F;
     EXPECT_LT(1.0 / std::sqrt(lost.variance_along(Vec3::UnitX(), 1.0)), 6.0);
 }
 
@@ -220,10 +221,10 @@ TEST(Patch, FacingBinsTellDirectionsApartAndStayInRange) {
 }
 
 void expect_harmless(const Patch& p) {
-    for (const Eigen::Vector3f& s : {p.s1, p.s2, p.doubt}) {
-        EXPECT_TRUE(s.allFinite());
-        EXPECT_LE(s.norm(), kCap);
-    }
+    const Mat3 C = covariance(p);
+    EXPECT_TRUE(C.allFinite() && p.doubt.allFinite());
+    EXPECT_LE(C.trace(), 2.0 * kCap * kCap);
+    EXPECT_LE(p.doubt.norm(), kCap);
     EXPECT_TRUE(p.centroid.allFinite() && p.sag_slope.allFinite());
     EXPECT_TRUE(std::isfinite(p.bend_rise) && std::isfinite(p.bend_run));
     EXPECT_TRUE(std::isfinite(p.sag({0.F, 0.F, 1.F}, {1.F, 2.F, 3.F})));
@@ -279,8 +280,7 @@ TEST(Patch, TheStrideSkipsWhatIsBetween) {
     const Eigen::Vector3f n = points.plane().normal;
     const Patch a = points.patch(n);
     const Patch b = make_patch(spread.data(), 8, 5, n, Eigen::Vector3f::Zero());
-    EXPECT_EQ(a.s1, b.s1);
-    EXPECT_EQ(a.s2, b.s2);
+    EXPECT_EQ(a.covariance, b.covariance);
     EXPECT_EQ(a.doubt, b.doubt);
     EXPECT_EQ(a.bend_rise, b.bend_rise);
     EXPECT_EQ(a.sag_slope, b.sag_slope);

@@ -170,9 +170,9 @@ TEST(RestStart, NothingIsWatchedThatDidNotBegin) {
 TEST(RestCloud, IsTheMeanOfUpToFiftyScans) {
     RestCloud cloud;
     for (int i = 0; i < 50; ++i) {
-        EXPECT_TRUE(cloud.add({{0.2F, 0.2F, i % 2 == 0 ? 0.3F : 0.1F}})) << i;
+        cloud.add({{0.2F, 0.2F, i % 2 == 0 ? 0.3F : 0.1F}});
     }
-    EXPECT_FALSE(cloud.add({{0.2F, 0.2F, 0.9F}}));
+    cloud.add({{0.2F, 0.2F, 90.0F}});
     const auto mean = cloud.mean(0.5);
     ASSERT_EQ(mean.size(), 1U);
     EXPECT_NEAR(mean[0].z(), 0.2F, kMillimetre);
@@ -184,8 +184,22 @@ TEST(RestCloud, KeepsVoxelsApartAndBeginsAnew) {
     EXPECT_EQ(cloud.mean(0.5).size(), 2U);
     cloud.clear();
     EXPECT_TRUE(cloud.mean(0.5).empty());
-    EXPECT_TRUE(cloud.add({{1.2F, 0.2F, 0.1F}}));
+    cloud.add({{1.2F, 0.2F, 0.1F}});
     EXPECT_EQ(cloud.mean(0.5).size(), 1U);
+}
+
+TEST(RestCloud, IsTakenLessAndLessOften) {
+    RestCloud cloud;
+    int taken = 0;
+    for (int i = 0; i < 60; ++i) {
+        cloud.add({{0.2F, 0.2F, 0.1F}});
+        if (!cloud.grown()) continue;
+        ++taken;
+        cloud.mean(0.5);
+    }
+    EXPECT_GT(taken, 8);
+    EXPECT_LT(taken, 16);
+    EXPECT_FALSE(cloud.grown());
 }
 
 }  // namespace

@@ -266,7 +266,8 @@ void Host::Impl::collect_rest(ScanResult& r) {
     NavState at_rest = x_;
     at_rest.pos = rest_.pose().t;
     at_rest.rot = rest_.pose().R;
-    if (!rest_cloud_.add(matcher_.to_map(at_rest)) || !rest_.held()) return;
+    rest_cloud_.add(matcher_.to_map(at_rest));
+    if (!rest_.held() || !rest_cloud_.grown()) return;
     map_.clear();
     map_.build(rest_cloud_.mean(config_.filter_size_map));
     r.times.map = watch_.lap();

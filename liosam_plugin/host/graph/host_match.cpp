@@ -109,9 +109,9 @@ void Host::Impl::collect_rest(const MeasureGroup& group, ScanResult& r) {
         rest_surfaces_.clear();
         return;
     }
-    if (!rest_surfaces_.add(cloud_.surfaces)) return;
+    rest_surfaces_.add(cloud_.surfaces);
     rest_corners_.add(cloud_.corners);
-    if (!rest.held() || map_.size() != 1) return;
+    if (!rest.held() || !rest_surfaces_.grown() || map_.size() != 1) return;
     map_.clear();
     map_.add(rest.pose(), group.end, rest_corners_.mean(config_.corner_leaf),
              rest_surfaces_.mean(surface_leaf()));

@@ -2,6 +2,8 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
+#include <array>
+
 #include "d2lio/degeneracy/noise_share.hpp"
 #include "d2lio/degeneracy/patch.hpp"
 
@@ -33,11 +35,18 @@ struct ProvenSum {
 };
 
 /// Sums over the accepted rows; see noise_share().
-struct SurfaceSums {
-    Mat3 information = Mat3::Zero();  ///< of n n^T
-    Mat3 noise = Mat3::Zero();        ///< of the covariances of the normals
+class SurfaceSums {
+  public:
+    Mat3 information() const { return symmetric(n_); }  ///< of n n^T
+    Mat3 noise() const { return symmetric(c_); }        ///< of the covariances of the normals
 
     void add(const Vec3& normal, const Patch& patch);
+
+  private:
+    using Upper = std::array<double, 6>;  ///< xx, xy, xz, yy, yz, zz
+    static Mat3 symmetric(const Upper& u);
+
+    Upper n_{}, c_{};
 };
 
 /// Finds the directions to clean.

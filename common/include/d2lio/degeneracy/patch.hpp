@@ -3,6 +3,7 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <array>
 
 namespace d2lio {
 
@@ -10,9 +11,9 @@ namespace d2lio {
 /// normal is, and how the surface bends. Map frame, m.
 struct Patch {
     Eigen::Vector3f centroid = Eigen::Vector3f::Zero();
-    /// Covariance of the unit normal: s1 s1^T + s2 s2^T, both in the plane, dimensionless (rad).
-    Eigen::Vector3f s1 = Eigen::Vector3f::Zero(), s2 = Eigen::Vector3f::Zero();
-    /// What leaving out the most decisive neighbour adds to it: doubt doubt^T.
+    /// Covariance of the unit normal, which lies in the plane: xx, xy, xz, yy, yz, zz; rad^2.
+    std::array<float, 6> covariance{};
+    /// What leaving out the most decisive neighbour adds to it: doubt doubt^T; rad.
     Eigen::Vector3f doubt = Eigen::Vector3f::Zero();
     /// Regression of the neighbours' distances from the plane on their squared distances from the
     /// centroid: the bend is bend_rise / bend_run (1/m), its variance sigma^2 / bend_run.

@@ -71,14 +71,16 @@ void reopen(Mat23x23& P);
 /// the noise of a single scan tilts it by a milliradian.
 class RestCloud {
   public:
-    /// Nothing happens once 50 scans are in. @returns whether it was taken.
-    bool add(const std::vector<Eigen::Vector3f>& points);
-    std::vector<Eigen::Vector3f> mean(double leaf) const;  ///< @param leaf voxel, m
-    void clear() { *this = RestCloud(); }                  ///< frees the points
+    /// Nothing happens once 50 scans are in.
+    void add(const std::vector<Eigen::Vector3f>& points);
+    /// Whether the mean has become another since the last one that was taken: a quarter more scans.
+    bool grown() const { return 4 * scans_ >= 5 * taken_ && scans_ > taken_; }
+    std::vector<Eigen::Vector3f> mean(double leaf);  ///< @param leaf voxel, m
+    void clear() { *this = RestCloud(); }            ///< frees the points
 
   private:
     std::vector<Eigen::Vector3f> points_;
-    int scans_ = 0;
+    int scans_ = 0, taken_ = 0;
 };
 
 }  // namespace d2lio

@@ -13,7 +13,7 @@ namespace d2lio {
 struct ScanDiagnostics;
 struct NoiseAwareConfig;
 struct BlindDirections;
-struct SurfaceSums;
+class SurfaceSums;
 
 /// What became of one scan point; every value but kAccepted is a reason for rejection.
 enum class Verdict : std::uint8_t {
