@@ -2,6 +2,8 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include <gtest/gtest.h>
 
+#include <algorithm>
+
 #include "local_map.hpp"
 
 namespace d2lio::fastlio {
@@ -83,6 +85,19 @@ TEST(LocalMap, ABetterPointTakesTheVoxel) {
     map.insert({better}, {found(map.tree(), better)});
     ASSERT_EQ(map.tree().size(), 1U);
     EXPECT_EQ(map.tree().points()[0], better);
+}
+
+TEST(LocalMap, FillingEmptyVoxelsOnlyLeavesWhatIsThere) {
+    LocalMap map(HostConfig{});
+    const Eigen::Vector3f old(0.1F, 0.1F, 0.1F), better(0.24F, 0.24F, 0.24F),
+        beside(0.6F, 0.1F, 0.1F);
+    map.build({old});
+    map.insert({better, beside}, {found(map.tree(), better), found(map.tree(), beside)},
+               LocalMap::Fill::kEmpty);
+    const auto points = map.tree().points();
+    ASSERT_EQ(points.size(), 2U);
+    EXPECT_EQ(std::count(points.begin(), points.end(), old), 1);
+    EXPECT_EQ(std::count(points.begin(), points.end(), beside), 1);
 }
 
 TEST(LocalMap, PointsApartFromTheMapGoInWithoutDownSampling) {

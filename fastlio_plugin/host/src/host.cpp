@@ -294,7 +294,9 @@ void Host::Impl::judge(UpdateStatus status, ScanResult& r) {
 void Host::Impl::grow_map(const MeasureGroup& group, ScanResult& r) {
     static const std::vector<Neighbours> kNoNeighbours;
     const bool settled = seconds_between(group.begin, first_begin_) >= kInitTime;
-    map_.insert(matcher_.to_map(x_), settled ? matcher_.neighbours() : kNoNeighbours);
+    const auto fill =
+        r.diagnostics.blind > 0 ? LocalMap::Fill::kEmpty : LocalMap::Fill::kNearestToCentre;
+    map_.insert(matcher_.to_map(x_), settled ? matcher_.neighbours() : kNoNeighbours, fill);
     r.times.map = watch_.lap();
 }
 

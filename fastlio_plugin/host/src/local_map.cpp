@@ -23,16 +23,27 @@ Eigen::Vector3f voxel_centre(const Eigen::Vector3f& p, float side) {
 
 enum class Insertion { kByVoxel, kApart, kNone };
 
-Insertion decide(const Eigen::Vector3f& p, const Neighbours& near, float side) {
+/// Whether the voxel of a point has one that bars it.
+bool taken(const Eigen::Vector3f& p, const Eigen::Vector3f& centre, const Neighbours& near,
+           float side, LocalMap::Fill fill) {
+    const float own = (p - centre).squaredNorm();
+    for (int i = 0; i < near.count; ++i) {
+        const Eigen::Vector3f off = near[i].point() - centre;
+        const bool bars = fill == LocalMap::Fill::kEmpty
+                              ? (off.cwiseAbs().array() <= 0.5F * side).all()
+                              : off.squaredNorm() < own;
+        if (bars) return true;
+    }
+    return false;
+}
+
+Insertion decide(const Eigen::Vector3f& p, const Neighbours& near, float side,
+                 LocalMap::Fill fill) {
     if (near.count == 0) return Insertion::kByVoxel;
     const Eigen::Vector3f centre = voxel_centre(p, side);
     const Eigen::Array3f off = (near[0].point() - centre).cwiseAbs().array();
     if ((off > 0.5F * side).all()) return Insertion::kApart;
-    const float own = (p - centre).squaredNorm();
-    for (int i = 0; i < near.count; ++i) {
-        if ((near[i].point() - centre).squaredNorm() < own) return Insertion::kNone;
-    }
-    return Insertion::kByVoxel;
+    return taken(p, centre, near, side, fill) ? Insertion::kNone : Insertion::kByVoxel;
 }
 
 }  // namespace
@@ -81,7 +92,7 @@ void LocalMap::follow(const Vec3& lidar) {
 }
 
 void LocalMap::insert(const std::vector<Eigen::Vector3f>& points,
-                      const std::vector<Neighbours>& neighbours) {
+                      const std::vector<Neighbours>& neighbours, Fill fill) {
     if (neighbours.empty()) {
         tree_.insert(points, true);
         return;
@@ -89,7 +100,7 @@ void LocalMap::insert(const std::vector<Eigen::Vector3f>& points,
     by_voxel_.clear();
     apart_.clear();
     for (std::size_t i = 0; i < points.size(); ++i) {
-        switch (decide(points[i], neighbours[i], voxel_)) {
+        switch (decide(points[i], neighbours[i], voxel_, fill)) {
             case Insertion::kByVoxel:
                 by_voxel_.push_back(points[i]);
                 break;

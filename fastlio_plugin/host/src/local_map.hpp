@@ -20,11 +20,16 @@ class LocalMap {
     void clear();
     /// Moves the box when the LiDAR (map frame, m) comes near a face, and deletes what leaves it.
     void follow(const Vec3& lidar);
-    /// Inserts a scan (map frame). A point is left out when the map has a point nearer to the
-    /// centre of its voxel among the neighbours found for it; `neighbours` may be empty (all go
-    /// in).
+    enum class Fill {
+        kNearestToCentre,  ///< FAST-LIO2: of a voxel's points the one nearest to its centre stays
+        /// What a voxel has stays: where the scan is blind along an axis, points that replace
+        /// others would take the map along with the estimate.
+        kEmpty,
+    };
+    /// Inserts a scan (map frame), judging a point by the neighbours found for it; `neighbours` may
+    /// be empty (all go in).
     void insert(const std::vector<Eigen::Vector3f>& points,
-                const std::vector<Neighbours>& neighbours);
+                const std::vector<Neighbours>& neighbours, Fill fill = Fill::kNearestToCentre);
 
   private:
     IkdTree tree_;
