@@ -1,58 +1,18 @@
 // SPDX-FileCopyrightText: 2026 D2-LIO contributors
 // SPDX-License-Identifier: BSD-3-Clause
-#include <gtest/gtest.h>
-
-#include <algorithm>
-
 #include "fastlio_drive.hpp"
+#include "host_running.hpp"
 
-namespace d2lio::fastlio {
+namespace d2lio::test {
 namespace {
 
-constexpr double kRoomError = 0.05;  // m, over 4 s with 1 cm range noise
+struct FastLio {
+    static fastlio::Host make() { return fastlio::Host(room_params()); }
+    static constexpr double kRoomError = 0.05;  // m, over 4 s with 1 cm range noise
+    static constexpr std::size_t kWithoutPose = 3;
+};
 
-TEST(RunningHost, ChangesItsModeBetweenScansAndGoesOn) {
-    Host host(test::room_params());
-    test::SyntheticRoom room;
-    std::vector<ScanResult> results;
-    test::Drive().feed(host, room, results);
-    EXPECT_TRUE(std::isnan(results.back().diagnostics.sigma));
-    host.reconfigure({{"rejection.mode", "kiss"}, {"degeneracy.method", "paper"}});
-    test::Drive more;
-    more.start = test::SyntheticRoom::kStart + more.scans * test::SyntheticRoom::kScanPeriod;
-    more.feed(host, room, results);
-    EXPECT_FALSE(std::isnan(results.back().diagnostics.sigma));
-    EXPECT_GT(results.back().diagnostics.prior_t.norm(), 0.0);
-    EXPECT_EQ(std::count_if(results.begin(), results.end(),
-                            [](const ScanResult& r) { return r.new_epoch; }),
-              0);
-    EXPECT_LT(test::largest_error(results), kRoomError);
-}
-
-TEST(RunningHost, RefusesAChangeAsAWhole) {
-    Host host(test::room_params());
-    EXPECT_THROW(host.reconfigure({{"rejection.mode", "kiss"}, {"rejection.tau", "-1"}}),
-                 ConfigError);
-    EXPECT_THROW(host.reconfigure({{"point_filter_num", "2"}}), ConfigError);
-    test::SyntheticRoom room;
-    std::vector<ScanResult> results;
-    test::Drive().feed(host, room, results);
-    EXPECT_TRUE(std::isnan(results.back().diagnostics.sigma));  // not kiss
-}
-
-TEST(RunningHost, TellsWhatBecameOfEveryPoint) {
-    Host host(test::room_params());
-    EXPECT_TRUE(host.scan_points().empty());
-    test::SyntheticRoom room;
-    std::vector<ScanResult> results;
-    test::Drive().feed(host, room, results);
-    const auto points = host.scan_points();
-    const auto verdicts = host.verdicts();
-    ASSERT_EQ(points.size(), verdicts.size());
-    const auto accepted = std::count(verdicts.begin(), verdicts.end(), Verdict::kAccepted);
-    EXPECT_GT(accepted, 0);
-    EXPECT_EQ(accepted, results.back().diagnostics.counts.accepted);
-}
+INSTANTIATE_TYPED_TEST_SUITE_P(FastLio, RunningHost, FastLio);
 
 }  // namespace
-}  // namespace d2lio::fastlio
+}  // namespace d2lio::test

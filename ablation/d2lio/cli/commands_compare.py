@@ -37,27 +37,30 @@ VARIANTS_HELP = (
 
 UPSTREAM_HELP = "upstream:fast_lio, upstream:lio_sam: those of the ROS workspace."
 
+Seq = Annotated[str, typer.Argument(metavar="SEQ", help=SEQ_HELP)]
+Host = Annotated[str, typer.Option(help="Of names without a host: fastlio, liosam, d2lio.")]
+Truth = Annotated[Path | None, typer.Option(help="Ground truth, TUM: T_world_imu.")]
+Config = Annotated[
+    Path | None, typer.Option(help="Of a bag: extrinsic, topics; see `d2lio run --help`.")
+]
+Duration = Annotated[float | None, typer.Option(min=1.0, help="Of a scene to simulate, s.")]
+Threads = Annotated[int, typer.Option(min=1, help="Threads of each estimator.")]
+
 
 def compare(
-    seq: Annotated[str, typer.Argument(metavar="SEQ", help=SEQ_HELP)],
+    seq: Seq,
     variants: Annotated[str, typer.Option(help=VARIANTS_HELP)] = DEFAULT,
-    host: Annotated[str, typer.Option(help="Of names without a host: fastlio, liosam, d2lio.")] = (
-        "fastlio"
-    ),
+    host: Host = "fastlio",
     out: Annotated[
         Path | None, typer.Option(help="Directory for everything; default results/compare_SEQ.")
     ] = None,
-    truth: Annotated[Path | None, typer.Option(help="Ground truth, TUM: T_world_imu.")] = None,
-    config: Annotated[
-        Path | None, typer.Option(help="Of a bag: extrinsic, topics; see `d2lio run --help`.")
-    ] = None,
-    duration: Annotated[
-        float | None, typer.Option(min=1.0, help="Of a scene to simulate, s.")
-    ] = None,
+    truth: Truth = None,
+    config: Config = None,
+    duration: Duration = None,
     jobs: Annotated[
         int | None, typer.Option(min=1, help="Variants at once; default: processor cores.")
     ] = None,
-    threads: Annotated[int, typer.Option(min=1, help="Threads of each estimator.")] = 1,
+    threads: Threads = 1,
     fresh: Annotated[bool, typer.Option("--fresh", help="Run again what is done already.")] = False,
     save: Annotated[
         Path | None, typer.Option(metavar="FILE.rrd", help="Place of the recording; no viewer.")
@@ -118,23 +121,17 @@ def collect(
 
 
 def launch(
-    seq: Annotated[str, typer.Argument(metavar="SEQ", help=SEQ_HELP)],
+    seq: Seq,
     variants: Annotated[str, typer.Option(help=f"{VARIANTS_HELP} {UPSTREAM_HELP}")] = DEFAULT,
-    host: Annotated[str, typer.Option(help="Of names without a host: fastlio, liosam, d2lio.")] = (
-        "fastlio"
-    ),
+    host: Host = "fastlio",
     out: Annotated[
         Path | None, typer.Option(help="Directory for everything; default results/launch_SEQ.")
     ] = None,
-    truth: Annotated[Path | None, typer.Option(help="Ground truth, TUM: T_world_imu.")] = None,
-    config: Annotated[
-        Path | None, typer.Option(help="Of a bag: extrinsic, topics; see `d2lio run --help`.")
-    ] = None,
-    duration: Annotated[
-        float | None, typer.Option(min=1.0, help="Of a scene to simulate, s.")
-    ] = None,
+    truth: Truth = None,
+    config: Config = None,
+    duration: Duration = None,
     rate: Annotated[float, typer.Option(min=0.01, help="Times as fast as recorded.")] = 1.0,
-    threads: Annotated[int, typer.Option(min=1, help="Threads of each estimator.")] = 1,
+    threads: Threads = 1,
     headless: Annotated[
         bool, typer.Option("--headless", help="No RViz; ends with the bag.")
     ] = False,

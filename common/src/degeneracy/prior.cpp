@@ -45,8 +45,10 @@ void DegeneracyConfig::bind(ParamTable& table) {
               "share from which on method noise_aware acts fully; above share_low");
     table.add("degeneracy.significance", noise_aware.significance, {0.0, 1e3}, "sigma",
               "by which a normal's component along such a direction must exceed its own noise");
-    table.add("degeneracy.rest", rest,
-              "method noise_aware: hold the pose and learn the IMU's noise until it first moves");
+    table.add(
+        "degeneracy.rest", rest,
+        "method noise_aware: once a second of IMU and scans has shown rest at the start, hold the "
+        "pose and learn the IMU's noise until the first motion");
     table.add("degeneracy.weak_share", weak_share, {0.0, 1.0 / 3.0}, "",
               "a direction whose eigenvalue is below this share of the trace is reported as weak");
 }

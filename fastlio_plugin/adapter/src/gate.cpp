@@ -58,9 +58,7 @@ Verdict Gate::fit(const Candidate& c, const Rejector& rejector) {
 /// Signed distance from the surface: from its plane, and from what its bend adds to that.
 float Gate::residual(std::size_t i, const Eigen::Vector3f& p) const {
     const float distance = planes_[i].signed_distance(p);
-    if (!keeps_patches_) return distance;
-    const Patch& patch = patches_[i];
-    return distance - patch.side * bends_.at(patch.facing) * patch.sag(planes_[i].normal, p);
+    return keeps_patches_ ? distance - bends_.sag(patches_[i], planes_[i].normal, p) : distance;
 }
 
 Verdict Gate::accept(const Candidate& c, const Rejector& rejector, Correspondence* out) {

@@ -86,7 +86,7 @@ bool ScanToMap::fit(Feature feature, std::size_t index, const Neighbours& near,
     float distance = plane.signed_distance(q);
     if (m.patch != nullptr) {
         *m.patch = make_patch(xyz, kStride, kNeighbours, plane.normal, sensor_);
-        distance -= m.patch->side * bends_.at(m.patch->facing) * m.patch->sag(plane.normal, q);
+        distance -= bends_.sag(*m.patch, plane.normal, q);
     }
     m.distance = static_cast<double>(distance);
     return true;

@@ -21,6 +21,11 @@ class BendField {
     /// Bend of a facing as learnt from earlier scans.
     float at(int facing) const { return bend_[static_cast<std::size_t>(facing)]; }
     void add(const Patch& patch);
+    /// How far the surface of a patch lies from its plane at p, along the plane's normal (m).
+    float sag(const Patch& patch, const Eigen::Vector3f& normal, const Eigen::Vector3f& p) const {
+        const float bend = at(patch.facing);
+        return bend == 0.F ? 0.F : patch.side * bend * patch.sag(normal, p);
+    }
     /// Closes a scan: older ones fade with a time constant of ten scans.
     void end_scan();
     void reset() { *this = BendField(); }

@@ -21,16 +21,10 @@ geometry_msgs::Quaternion to_quaternion(const Mat3& R) {
     return out;
 }
 
-geometry_msgs::Point to_point(const Vec3& v) {
-    geometry_msgs::Point out;
-    out.x = v.x();
-    out.y = v.y();
-    out.z = v.z();
-    return out;
-}
-
-geometry_msgs::Vector3 to_vector(const Vec3& v) {
-    geometry_msgs::Vector3 out;
+/// @tparam Message geometry_msgs::Point or Vector3.
+template <typename Message>
+Message to_xyz(const Vec3& v) {
+    Message out;
     out.x = v.x();
     out.y = v.y();
     out.z = v.z();
@@ -65,8 +59,8 @@ constexpr double kLongestAxis = 4.0;  // m, of the ellipsoid
 visualization_msgs::Marker arrow(const ScanResult& r, const std::string& frame, const char* space,
                                  int id, const Vec3& direction) {
     auto m = marker(r, frame, space, id, visualization_msgs::Marker::ARROW);
-    m.points = {to_point(r.state.pos - kArrow * direction),
-                to_point(r.state.pos + kArrow * direction)};
+    m.points = {to_xyz<geometry_msgs::Point>(r.state.pos - kArrow * direction),
+                to_xyz<geometry_msgs::Point>(r.state.pos + kArrow * direction)};
     m.scale.x = 0.12;
     m.scale.y = 0.3;
     m.scale.z = 0.4;
@@ -102,7 +96,7 @@ visualization_msgs::Marker ellipsoid(const ScanResult& r, const std::string& fra
     }
     Mat3 axes = d.v_t;
     if (axes.determinant() < 0.0) axes.col(2) = -axes.col(2);
-    m.pose.position = to_point(r.state.pos);
+    m.pose.position = to_xyz<geometry_msgs::Point>(r.state.pos);
     m.pose.orientation = to_quaternion(axes);
     const auto length = [&d](int i) {
         return kLongestAxis * std::sqrt(d.lambda_t[0] / d.lambda_t[i]);
@@ -116,7 +110,7 @@ visualization_msgs::Marker ellipsoid(const ScanResult& r, const std::string& fra
 
 visualization_msgs::Marker label(const ScanResult& r, const std::string& frame) {
     auto m = marker(r, frame, "health", 0, visualization_msgs::Marker::TEXT_VIEW_FACING);
-    m.pose.position = to_point(r.state.pos + Vec3(0, 0, 2.5));
+    m.pose.position = to_xyz<geometry_msgs::Point>(r.state.pos + Vec3(0, 0, 2.5));
     m.scale.z = 0.8;
     m.color = colour(r.health, 1.0F);
     char text[96];
@@ -139,13 +133,13 @@ nav_msgs::Odometry to_odometry(const ScanResult& r, const Frames& frames, const 
     out.header.stamp = to_time(r.stamp);
     out.header.frame_id = frames.map;
     out.child_frame_id = frames.body;
-    out.pose.pose.position = to_point(r.state.pos);
+    out.pose.pose.position = to_xyz<geometry_msgs::Point>(r.state.pos);
     out.pose.pose.orientation = to_quaternion(r.state.rot);
     for (int i = 0; i < 36; ++i) {
         out.pose.covariance[static_cast<std::size_t>(i)] = r.covariance(i / 6, i % 6);
     }
-    out.twist.twist.linear = to_vector(r.state.rot.transpose() * r.state.vel);
-    out.twist.twist.angular = to_vector(gyro - r.state.gyro_bias);
+    out.twist.twist.linear = to_xyz<geometry_msgs::Vector3>(r.state.rot.transpose() * r.state.vel);
+    out.twist.twist.angular = to_xyz<geometry_msgs::Vector3>(gyro - r.state.gyro_bias);
     return out;
 }
 
@@ -153,7 +147,7 @@ geometry_msgs::PoseStamped to_pose(const Pose& T, Stamp stamp, const std::string
     geometry_msgs::PoseStamped out;
     out.header.stamp = to_time(stamp);
     out.header.frame_id = frame;
-    out.pose.position = to_point(T.t);
+    out.pose.position = to_xyz<geometry_msgs::Point>(T.t);
     out.pose.orientation = to_quaternion(T.R);
     return out;
 }
@@ -163,7 +157,7 @@ geometry_msgs::TransformStamped to_transform(const ScanResult& r, const Frames& 
     out.header.stamp = to_time(r.stamp);
     out.header.frame_id = frames.map;
     out.child_frame_id = frames.body;
-    out.transform.translation = to_vector(r.state.pos);
+    out.transform.translation = to_xyz<geometry_msgs::Vector3>(r.state.pos);
     out.transform.rotation = to_quaternion(r.state.rot);
     return out;
 }

@@ -55,8 +55,7 @@ class UpstreamGlue {
         if (adapter_.reads_surfaces()) {  // upstream shows the adapter no neighbours
             throw std::invalid_argument(
                 "D2-LIO cannot start:\n  degeneracy.method = noise_aware: not inside LIO-SAM; "
-                "allowed "
-                "there: none, paper, remap");
+                "allowed there: none, paper, remap");
         }
         changes_ = adapter_.rejects() || adapter_.has_prior();
         if (topic == "-") topic = changes_ ? "d2lio/diagnostics" : "";
