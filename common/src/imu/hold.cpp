@@ -39,6 +39,13 @@ void hold_still(const Pose& rest, NavState& x, Mat23x23& P) {
     P = 0.5 * (reduced + reduced.transpose());
 }
 
+void anchor_attitude(Mat23x23& P) {
+    constexpr double kAnchored = 1e-6;  ///< rad^2
+    P.middleRows<3>(I::kRot).setZero();
+    P.middleCols<3>(I::kRot).setZero();
+    P.diagonal().segment<3>(I::kRot).setConstant(kAnchored);
+}
+
 Mat23x23 start_covariance() {
     Vec23 p = Vec23::Ones();
     p.segment<3>(I::kExtrinsicRot).setConstant(1e-5);

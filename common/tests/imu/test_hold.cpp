@@ -151,5 +151,18 @@ TEST(StartCovariance, IsThatOfFastLio2) {
     EXPECT_EQ(P(I::kGravity + 1, I::kGravity + 1), 1e-5);
 }
 
+TEST(Hold, AnAnchoredAttitudeIsKnownAndSharesNothing) {
+    test::Random random(7);
+    const Mat23x23 before = random.covariance();
+    Mat23x23 P = before;
+    anchor_attitude(P);
+    const Mat3 attitude = P.block<3, 3>(I::kRot, I::kRot);
+    EXPECT_EQ((attitude - 1e-6 * Mat3::Identity()).norm(), 0.0);
+    EXPECT_EQ(P.middleRows<3>(I::kRot).norm(), attitude.norm());
+    EXPECT_EQ(P.middleCols<3>(I::kRot).norm(), attitude.norm());
+    EXPECT_EQ((P.bottomRightCorner<17, 17>() - before.bottomRightCorner<17, 17>()).norm(), 0.0);
+    EXPECT_EQ((P.topLeftCorner<3, 3>() - before.topLeftCorner<3, 3>()).norm(), 0.0);
+}
+
 }  // namespace
 }  // namespace d2lio

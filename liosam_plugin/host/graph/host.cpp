@@ -96,7 +96,7 @@ void Host::Impl::process(MeasureGroup& group, ScanResult& r) {
         return;
     }
     r.has_pose = true;
-    matcher_.set_resting(predictor_.rest().held());
+    matcher_.set_rest(predictor_.rest());
     const Pose estimate = match(r);
     if (filters()) {
         fuse(estimate, r);

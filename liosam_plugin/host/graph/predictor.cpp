@@ -64,6 +64,7 @@ void Predictor::reset() {
 
 void Predictor::start_filter(bool rests) {
     P_ = d2lio::start_covariance();
+    anchor_attitude(P_);
     if (rests) rest_.begin(x_, P_);
 }
 

@@ -148,7 +148,8 @@ void ScanToMap::clean(const Pose& T) {
         const Row& row = rows_[i];
         if (row.used && row.has_patch) sums.add(row.normal(), patches_[i]);
     }
-    const BlindDirections blind = adapter_.find_blind(sums);
+    BlindDirections blind = adapter_.find_blind(sums);
+    if (watched_) blind.blend.head(blind.count).setOnes();
     if (blind.count == 0 || resting_) return;
     proven_.assign(rows_.size(), Vec3::Zero());
     ProvenSum sum;
