@@ -96,7 +96,8 @@ void Host::Impl::process(MeasureGroup& group, ScanResult& r) {
         return;
     }
     r.has_pose = true;
-    matcher_.set_rest(predictor_.rest());
+    const RestStart& rest = predictor_.rest();
+    matcher_.set_resting(rest.held() || rest.watched());
     const Pose estimate = match(r);
     if (filters()) {
         fuse(estimate, r);

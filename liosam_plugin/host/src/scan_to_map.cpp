@@ -148,8 +148,7 @@ void ScanToMap::clean(const Pose& T) {
         const Row& row = rows_[i];
         if (row.used && row.has_patch) sums.add(row.normal(), patches_[i]);
     }
-    BlindDirections blind = adapter_.find_blind(sums);
-    if (watched_) blind.blend.head(blind.count).setOnes();
+    const BlindDirections blind = adapter_.find_blind(sums);
     if (blind.count == 0 || resting_) return;
     proven_.assign(rows_.size(), Vec3::Zero());
     ProvenSum sum;

@@ -7,7 +7,6 @@
 #include "d2lio/degeneracy/bend.hpp"
 #include "d2lio/degeneracy/blind.hpp"
 #include "d2lio/host/point_loop.hpp"
-#include "d2lio/host/rest_start.hpp"
 #include "d2lio/liosam/adapter.hpp"
 #include "d2lio/map/ikd_tree.hpp"
 #include "d2lio/types.hpp"
@@ -66,12 +65,9 @@ class ScanToMap {
     /// @param prior information of the guess (rotation in the body's right tangent, position in the
     /// map), which the estimate then contains; null: the scan alone decides.
     MatchReport align(const MatchInput& input, Pose& T_map_imu, const Mat6* prior = nullptr);
-    /// Method noise_aware: at rest the rows are only looked at. Where rest is watched for, all that
-    /// noise may dominate must prove itself: else it sets off a velocity that nobody knows yet.
-    void set_rest(const RestStart& rest) {
-        resting_ = rest.held();
-        watched_ = rest.watched();
-    }
+    /// At rest the rows are only looked at (method noise_aware): also while rest is watched for,
+    /// when the noise that holds a blind direction does no harm and its absence would.
+    void set_resting(bool resting) { resting_ = resting; }
     void reset() { bends_.reset(); }
 
   private:
@@ -118,7 +114,7 @@ class ScanToMap {
     std::vector<Row> rows_;
     std::vector<Memory> memory_;
     Mat6 keep_ = Mat6::Identity();
-    bool resting_ = false, watched_ = false;
+    bool resting_ = false;
     std::vector<Patch> patches_;  ///< of the rows; only while the adapter reads surfaces
     std::vector<Vec3> proven_;    ///< shares of the rows along the blind directions
     BendField bends_;
