@@ -7,7 +7,9 @@ namespace d2lio::test {
 namespace {
 
 struct FastLio {
-    static fastlio::Host make() { return fastlio::Host(room_params()); }
+    static fastlio::Host make(const ParamMap& params = {}) {
+        return fastlio::Host(room_params(params));
+    }
     static constexpr double kRoomError = 0.05;  // m, over 4 s with 1 cm range noise
     static constexpr std::size_t kWithoutPose = 3;
 };

@@ -11,9 +11,9 @@
 /// What a host that runs must allow, for every host.
 namespace d2lio::test {
 
-/// @tparam Traits of one host: `make()` builds it for the room with every scan processed and
-/// without rejection, `kRoomError` (m) is how far it may stray there, `kWithoutPose` how many scans
-/// get no pose.
+/// @tparam Traits of one host: `make(params)` builds it for the room with every scan processed
+/// and without rejection, `kRoomError` (m) is how far it may stray there, `kWithoutPose` how many
+/// scans get no pose.
 template <typename Traits>
 class RunningHost : public ::testing::Test {};
 TYPED_TEST_SUITE_P(RunningHost);
@@ -61,7 +61,24 @@ TYPED_TEST_P(RunningHost, TellsWhatBecameOfEveryPoint) {
     EXPECT_EQ(accepted, results.back().diagnostics.counts.accepted);
 }
 
+TYPED_TEST_P(RunningHost, MovesOnWhenARestIsCalledOff) {
+    auto host = TypeParam::make({{"degeneracy.method", "noise_aware"}});
+    SyntheticRoom room;
+    std::vector<ScanResult> results;
+    Drive rest;  // two seconds before the first motion, held from the second on
+    rest.start = SyntheticRoom::kStart - 15 * SyntheticRoom::kScanPeriod;
+    rest.scans = 25;
+    rest.feed(host, room, results);
+    EXPECT_LT(results.back().state.vel.norm(), 1e-3);
+    host.reconfigure({{"degeneracy.rest", "false"}});
+    Drive more;
+    more.start = rest.start + rest.scans * SyntheticRoom::kScanPeriod;
+    more.feed(host, room, results);
+    EXPECT_LT(largest_error(results, TypeParam::kWithoutPose), TypeParam::kRoomError);
+}
+
 REGISTER_TYPED_TEST_SUITE_P(RunningHost, ChangesItsModeBetweenScansAndGoesOn,
-                            RefusesAChangeAsAWhole, TellsWhatBecameOfEveryPoint);
+                            RefusesAChangeAsAWhole, MovesOnWhenARestIsCalledOff,
+                            TellsWhatBecameOfEveryPoint);
 
 }  // namespace d2lio::test

@@ -273,6 +273,7 @@ void Host::reconfigure(const ParamMap& changes) {
     }
     Adapter scratch;
     d2lio::reconfigure(changes, scratch, impl_->adapter_, impl_->params_);
+    if (!impl_->adapter_.starts_at_rest()) impl_->predictor_.end_rest();
 }
 
 std::vector<Eigen::Vector3f> Host::scan_points() const { return impl_->scan_points(); }

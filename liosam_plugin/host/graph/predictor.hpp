@@ -47,6 +47,7 @@ class Predictor {
     /// @param matched whether the estimate comes from the scan. @returns whether it is held.
     bool hold(const Pose& estimate, bool matched, const ScanDiagnostics& scan);
     const RestStart& rest() const { return rest_; }
+    void end_rest() { rest_.end(); }
 
     const NavState& state() const { return x_; }
     /// 6x6 of the pose relative to the last matched one: rotation (right, body), position (map).

@@ -7,8 +7,9 @@ namespace d2lio::test {
 namespace {
 
 struct LioSam {
-    static liosam::Host make() {
-        return liosam::Host(liosam::Preset::kLioSam, indoor({{"mappingProcessInterval", "0"}}));
+    static liosam::Host make(ParamMap params = {}) {
+        params["mappingProcessInterval"] = "0";
+        return liosam::Host(liosam::Preset::kLioSam, indoor(params));
     }
     static constexpr double kRoomError = 0.05;  // m, over 4 s with 1 cm range noise
     static constexpr std::size_t kWithoutPose = 2;

@@ -64,7 +64,7 @@ class RestStart {
     double watched_ = 0.0;                     ///< s
 };
 
-/// Position and velocity after a contradiction: what was held is no longer certain.
+/// Pose and velocity after a contradiction: what was held is no longer certain.
 void reopen(Mat23x23& P);
 
 /// Mean of the scans at rest, voxel by voxel. All later poses rest on the map of that place, and
