@@ -26,6 +26,8 @@ void Plugin::Core::rebuild() {
 
 Status Plugin::Core::begin(bool usable, const Pose& previous) {
     current = ScanDiagnostics{};
+    blind_before = blind_now;
+    blind_now = BlindDirections{};
     in_scan =
         usable && is_finite(predicted) && is_finite(previous) && P_r.allFinite() && P_t.allFinite();
     if (!in_scan) return Status::kBadInput;
@@ -46,7 +48,9 @@ BlindDirections Plugin::Core::find_blind(const SurfaceSums& sums) {
     const NoiseShare share = noise_share(sums.information(), sums.noise());
     current.noise_share = share.share;
     current.noise_axes = share.axes;
-    const BlindDirections blind = d2lio::find_blind(share, P_t, degeneracy.noise_aware);
+    BlindDirections blind = d2lio::find_blind(share, P_t, degeneracy.noise_aware);
+    stay_blind(blind_before, blind);
+    blind_now = blind;
     current.blind = blind.count;
     return blind;
 }
@@ -152,6 +156,7 @@ bool Plugin::starts_at_rest() const { return reads_surfaces() && core_->degenera
 
 void Plugin::reset() {
     core_->rebuild();
+    core_->blind_now = BlindDirections{};
     core_->in_scan = false;
 }
 

@@ -109,6 +109,27 @@ TEST(FindBlind, CountsTheDirectionsAboveTheLowShareAndBlendsUpToTheHighOne) {
     EXPECT_EQ(find_blind(s, Mat3::Identity(), bold).count, 3);
 }
 
+TEST(StayBlind, KeepsADirectionAsBlindAsItWasWhileItWavers) {
+    const auto at = [](double degrees, double share) {
+        return find_blind(blind_along(turned(degrees), share), Mat3::Identity(), kConfig);
+    };
+    const BlindDirections before = at(0.0, 0.9);
+    BlindDirections now = at(10.0, 0.4);
+    EXPECT_NEAR(now.blend[0], 0.5, kExact);
+    stay_blind(before, now);
+    EXPECT_EQ(now.blend[0], 1.0);
+
+    BlindDirections other = at(40.0, 0.4);
+    stay_blind(before, other);
+    EXPECT_NEAR(other.blend[0], 0.5, kExact);
+    BlindDirections more = at(0.0, 0.9);
+    stay_blind(at(0.0, 0.4), more);
+    EXPECT_EQ(more.blend[0], 1.0);
+    BlindDirections seen = at(0.0, 0.29);
+    stay_blind(before, seen);
+    EXPECT_EQ(seen.count, 0);
+}
+
 TEST(FindBlind, SlantedAxesComeOutOrthonormalAndSpanTheSame) {
     test::Random random(1);
     for (int i = 0; i < 50; ++i) {

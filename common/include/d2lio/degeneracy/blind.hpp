@@ -59,6 +59,11 @@ class SurfaceSums {
 BlindDirections find_blind(const NoiseShare& share, const Mat3& P_t,
                            const NoiseAwareConfig& config);
 
+/// A direction that was blind in the scan before stays as blind as it was, until the noise's share
+/// falls below config.share_low: what leaks in while it wavers would claim to be a measurement, and
+/// move the map along.
+void stay_blind(const BlindDirections& before, BlindDirections& now);
+
 /// A row after cleaning.
 struct CleanedRow {
     Vec3 normal;          ///< map frame, not of unit length where a component went

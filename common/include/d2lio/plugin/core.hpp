@@ -32,6 +32,7 @@ struct Plugin::Core {
     ScanDiagnostics current, last;
     std::vector<std::pair<std::string, double>> columns = last.columns();
 
+    BlindDirections blind_before, blind_now;  ///< of the last scan and of this one
     bool in_scan = false;
     Pose predicted;                                       ///< T_map_imu
     Mat3 P_r = Mat3::Identity(), P_t = Mat3::Identity();  ///< of the prediction, rad^2, m^2
