@@ -3,6 +3,7 @@
 #include "d2lio/fastlio/host.hpp"
 
 #include "d2lio/fastlio/adapter.hpp"
+#include "d2lio/host/pose_uncertainty.hpp"
 #include "d2lio/host/rest_start.hpp"
 #include "d2lio/host/stop_watch.hpp"
 #include "d2lio/imu/hold.hpp"
@@ -89,6 +90,7 @@ class Host::Impl {
     void grow_map(const MeasureGroup& group, ScanResult& r);
     void finish(ScanResult& r) const;
 
+    PoseUncertainty uncertainty_;
     RestCloud rest_cloud_;  ///< map frame
     bool first_scan_ = true;
     int failures_ = 0;  ///< refused updates in a row
@@ -105,6 +107,7 @@ void Host::Impl::begin_epoch() {
     adapter_.reset();
     rest_.reset();
     rest_cloud_.clear();
+    uncertainty_.clear();
 }
 
 std::optional<ScanResult> Host::Impl::step() {
@@ -174,7 +177,14 @@ bool Host::Impl::start_up(const MeasureGroup& group, ScanResult& r) {
 }
 
 bool Host::Impl::predict(MeasureGroup& group, ScanResult& r) {
-    const auto& knots = imu_.propagate(group, intake_.loosen(group, imu_.mean_period(), r), x_, P_);
+    const NavState before = x_;
+    const double noise_scale = intake_.loosen(group, imu_.mean_period(), r);
+    if (!adapter_.reads_surfaces()) {
+        uncertainty_.clear();
+    } else if (!map_.empty() && !uncertainty_.begun()) {
+        uncertainty_.take(P_);
+    }
+    const auto& knots = imu_.propagate(group, noise_scale, x_, P_);
     if (!x_.is_finite() || !P_.allFinite()) {
         begin_epoch();
         ++resets_;
@@ -182,6 +192,9 @@ bool Host::Impl::predict(MeasureGroup& group, ScanResult& r) {
         r.new_epoch = true;
         say(r, "prediction is not finite: starting anew");
         return false;
+    }
+    if (uncertainty_.begun()) {
+        uncertainty_.predict(before, x_, imu_.steps(), noise_scale * imu_.integrated_noise());
     }
     deskew(group.scan.points, knots, x_.T_map_imu(), x_.T_imu_lidar());
     cloud_.clear();
@@ -199,6 +212,7 @@ void Host::Impl::start_map(ScanResult& r) {
     matcher_.begin(downsampled_, map_.tree());
     const std::vector<Eigen::Vector3f>& points = matcher_.to_map(x_);
     map_.build(points);
+    if (adapter_.reads_surfaces()) uncertainty_.begin(P_);
     if (adapter_.starts_at_rest()) {
         rest_.begin(x_, P_);
         rest_cloud_.add(points);
@@ -234,7 +248,9 @@ bool Host::Impl::update(const Pose& previous, ScanResult& r) {
     r.diagnostics = adapter_.diagnostics();
     r.diagnostics.iterations = report.iterations;
     judge(report.status, r);
+    if (updated && uncertainty_.begun()) uncertainty_.update(x_, ieskf_.match(P_));
     rest_on(before ? &*before : nullptr, updated, r.diagnostics);
+    if (rest_.held() && uncertainty_.begun()) uncertainty_.begin(P_);
     r.times.search = matcher_.search_ms();
     r.times.update = watch_.lap() - r.times.search;
     if (rest_.watched() || rest_.held()) collect_rest(r);
@@ -251,6 +267,7 @@ void Host::Impl::rest_on(const Prediction* before, bool updated, const ScanDiagn
             break;
         case RestStart::Event::kContradicted:
             reopen(P_);
+            if (uncertainty_.begun()) uncertainty_.take(P_);
             return;
         case RestStart::Event::kNothing:
             if (!rest_.held()) return;
@@ -296,7 +313,12 @@ void Host::Impl::grow_map(const MeasureGroup& group, ScanResult& r) {
     const bool settled = seconds_between(group.begin, first_begin_) >= kInitTime;
     const auto fill =
         r.diagnostics.blind > 0 ? LocalMap::Fill::kEmpty : LocalMap::Fill::kNearestToCentre;
-    map_.insert(matcher_.to_map(x_), settled ? matcher_.neighbours() : kNoNeighbours, fill);
+    const std::size_t added =
+        map_.insert(matcher_.to_map(x_), settled ? matcher_.neighbours() : kNoNeighbours, fill);
+    if (uncertainty_.begun()) {
+        uncertainty_.grow(x_,
+                          static_cast<double>(added) / static_cast<double>(downsampled_.size()));
+    }
     r.times.map = watch_.lap();
 }
 
@@ -304,7 +326,7 @@ void Host::Impl::finish(ScanResult& r) const {
     r.map_points = map_.tree().size();
     if (!r.has_pose) return;
     r.state = x_;
-    r.covariance = pose_covariance(x_, P_);
+    r.covariance = uncertainty_.begun() ? uncertainty_.covariance(x_) : pose_covariance(x_, P_);
 }
 
 Mat6 pose_covariance(const NavState& x, const Mat23x23& P) {

@@ -70,6 +70,17 @@ bool Ieskf::posterior(const NavState& predicted, const Mat23x23& P, const Vec23&
     return out.allFinite() && Eigen::LLT<Mat23x23>(out).info() == Eigen::Success;
 }
 
+PoseUncertainty::Match Ieskf::match(const Mat23x23& P) const {
+    PoseUncertainty::Match m;
+    const auto H = rows_.H.topLeftCorner(rows_.rows, 6);
+    m.gain = KH_;
+    m.noise = KH_ * P.topRows<12>();
+    m.information = H.transpose() * H / options_.variance;
+    const double squares = rows_.residual.head(rows_.rows).squaredNorm();
+    m.misfit = squares / (static_cast<double>(rows_.rows) * options_.variance);
+    return m;
+}
+
 UpdateReport Ieskf::update(NavState& x, Mat23x23& P, const Measure& measure) {
     const NavState predicted = x;
     const Mat23x23 predicted_P = P;

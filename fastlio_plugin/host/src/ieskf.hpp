@@ -5,6 +5,7 @@
 #include <functional>
 
 #include "d2lio/geometry/state.hpp"
+#include "d2lio/host/pose_uncertainty.hpp"
 
 namespace d2lio::fastlio {
 
@@ -47,6 +48,8 @@ class Ieskf {
   public:
     explicit Ieskf(const IeskfOptions& options) : options_(options) {}
     UpdateReport update(NavState& x, Mat23x23& P, const Measure& measure);
+    /// How the last update moved the state. @param P its posterior.
+    PoseUncertainty::Match match(const Mat23x23& P) const;
 
   private:
     /// Covariance after the last step, carried over to the posterior's tangent space; false when

@@ -56,4 +56,10 @@ const std::vector<MotionKnot>& ImuProcessor::propagate(const MeasureGroup& group
     return knots_;
 }
 
+Mat12 ImuProcessor::integrated_noise() const {
+    double squares = 0.0;
+    for (const ImuStep& s : steps()) squares += s.dt * s.dt;
+    return squares * Q_;
+}
+
 }  // namespace d2lio::fastlio

@@ -30,6 +30,8 @@ class ImuProcessor {
     double mean_period() const { return stepper_.mean_period(); }
     /// Inputs of the last propagate().
     const std::vector<ImuStep>& steps() const { return stepper_.steps(); }
+    /// Covariance of the readings that the last propagate() integrated, sum of dt^2 Q.
+    Mat12 integrated_noise() const;
     double accel_scale() const { return accel_scale_; }  ///< readings to m/s^2
     /// Noise from here on instead of the configured one.
     void expect(const ProcessNoise& noise) { Q_ = noise.matrix(); }

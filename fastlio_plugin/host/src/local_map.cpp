@@ -91,11 +91,11 @@ void LocalMap::follow(const Vec3& lidar) {
     if (!leaving_.empty()) tree_.erase_boxes(leaving_);
 }
 
-void LocalMap::insert(const std::vector<Eigen::Vector3f>& points,
-                      const std::vector<Neighbours>& neighbours, Fill fill) {
+std::size_t LocalMap::insert(const std::vector<Eigen::Vector3f>& points,
+                             const std::vector<Neighbours>& neighbours, Fill fill) {
     if (neighbours.empty()) {
         tree_.insert(points, true);
-        return;
+        return points.size();
     }
     by_voxel_.clear();
     apart_.clear();
@@ -113,6 +113,7 @@ void LocalMap::insert(const std::vector<Eigen::Vector3f>& points,
     }
     tree_.insert(by_voxel_, true);
     tree_.insert(apart_, false);
+    return by_voxel_.size() + apart_.size();
 }
 
 }  // namespace d2lio::fastlio

@@ -28,8 +28,10 @@ class LocalMap {
     };
     /// Inserts a scan (map frame), judging a point by the neighbours found for it; `neighbours` may
     /// be empty (all go in).
-    void insert(const std::vector<Eigen::Vector3f>& points,
-                const std::vector<Neighbours>& neighbours, Fill fill = Fill::kNearestToCentre);
+    /// @returns how many points were found to belong in
+    std::size_t insert(const std::vector<Eigen::Vector3f>& points,
+                       const std::vector<Neighbours>& neighbours,
+                       Fill fill = Fill::kNearestToCentre);
 
   private:
     IkdTree tree_;

@@ -205,7 +205,8 @@ void Host::Impl::finish(ScanResult& r) const {
     r.map_points = map_.corners().size() + map_.surfaces().size();
     if (!r.has_pose) return;
     r.state = predictor_.state();
-    r.covariance = ros_order(previous_, covariance_);
+    r.covariance = predictor_.uncertainty().begun() ? predictor_.uncertainty().covariance(r.state)
+                                                    : ros_order(previous_, covariance_);
 }
 
 /// Corners, then surfaces, as the adapter counts them.

@@ -54,6 +54,7 @@ class Host::Impl {
     void fuse(const Pose& estimate, ScanResult& r);
     void collect_rest(const MeasureGroup& group, ScanResult& r);
     void grow_map(const MeasureGroup& group, ScanResult& r);
+    double new_share() const;
     void close_loop(ScanResult& r);
     void begin_epoch();
     void start_anew(const std::string& why, ScanResult& r);

@@ -96,7 +96,9 @@ void Host::Impl::correct(const Pose& estimate, ScanResult& r) {
 
 void Host::Impl::fuse(const Pose& estimate, ScanResult& r) {
     const bool held = predictor_.hold(estimate, matched(), r.diagnostics);
-    if (!held && matched()) predictor_.fuse(estimate, covariance_);
+    if (!held && matched())
+        predictor_.fuse(estimate, covariance_, report_.information / config_.matching.variance,
+                        report_.mean_square / config_.matching.variance);
     previous_ = predictor_.state().T_map_imu();
     covariance_ = predictor_.covariance();
 }
@@ -122,9 +124,22 @@ void Host::Impl::grow_map(const MeasureGroup& group, ScanResult& r) {
     if (map_.due(previous_, group.end)) {
         map_.add(previous_, group.end, cloud_.corners, cloud_.surfaces);
         keyframes_.add(previous_);
+        if (filters()) predictor_.uncertainty().grow(predictor_.state(), new_share());
         close_loop(r);
     }
     r.times.map += watch_.lap();
+}
+
+/// Share of the newest keyframe among those around the body, up to the mean range of its points.
+double Host::Impl::new_share() const {
+    double range = 0.0;
+    for (const Eigen::Vector3f& p : cloud_.surfaces) range += static_cast<double>(p.norm());
+    range /= static_cast<double>(std::max<std::size_t>(cloud_.surfaces.size(), 1));
+    std::size_t near = 0;
+    for (std::size_t i = 0; i < map_.size(); ++i) {
+        if ((map_[i].pose.t - previous_.t).norm() <= range) ++near;
+    }
+    return 1.0 / static_cast<double>(std::max<std::size_t>(near, 1));
 }
 
 /// Where the newest keyframe closes a loop: all keyframes move, and the estimate with the newest,

@@ -60,11 +60,13 @@ void Predictor::reset() {
     stepper_.reset();
     steps_.clear();
     rest_.reset();
+    uncertainty_.clear();
 }
 
 void Predictor::start_filter(bool rests) {
     P_ = d2lio::start_covariance();
     anchor_attitude(P_);
+    uncertainty_.begin(P_);
     if (rests) rest_.begin(x_, P_);
 }
 
@@ -75,18 +77,21 @@ bool Predictor::hold(const Pose& estimate, bool matched, const ScanDiagnostics& 
             break;
         case RestStart::Event::kContradicted:
             reopen(P_);
+            uncertainty_.take(P_);
             return false;
         case RestStart::Event::kNothing:
             if (!rest_.held()) return false;
             hold_still(rest_.pose(), x_, P_);
     }
+    uncertainty_.begin(P_);
     steps_.clear();
     return true;
 }
 
 /// With the pose's error a and the others' b, jointly normal: b follows by P_ba P_aa^-1 a, and its
 /// covariance shrinks as far as that of the pose does.
-void Predictor::fuse(const Pose& T, const Mat6& covariance) {
+void Predictor::fuse(const Pose& T, const Mat6& covariance, const Mat6& information,
+                     double misfit) {
     using Mat23x6 = Eigen::Matrix<double, 23, 6>;
     const Mat6 prior = this->covariance();
     const Eigen::LLT<Mat6> llt(prior);
@@ -105,6 +110,16 @@ void Predictor::fuse(const Pose& T, const Mat6& covariance) {
     x_ = next;
     P_ = 0.5 * (reduced + reduced.transpose());
     steps_.clear();
+    Mat6 order;  // position before rotation
+    order << Mat3::Zero(), Mat3::Identity(), Mat3::Identity(), Mat3::Zero();
+    PoseUncertainty::Match match;
+    match.gain.leftCols<6>() =
+        gain * (Mat6::Identity() - llt.solve(covariance).transpose()) * order;
+    const Mat23x6 spread = gain * covariance;
+    match.noise = spread * information * spread.transpose();
+    match.information = order * information * order;
+    match.misfit = misfit;
+    uncertainty_.update(x_, match);
 }
 
 void Predictor::move(const Pose& correction) {
@@ -160,15 +175,20 @@ Mat12 Predictor::noise_over(double dt, double scale) const {
 void Predictor::advance(const MeasureGroup& group, double noise_scale) {
     const std::vector<ImuStep>& steps = stepper_.cut(group);
     rest_.record(steps);
+    const NavState before = x_;
+    Mat12 noise = Mat12::Zero();
     const double first = steps.front().offset - steps.front().dt;
     knots_.clear();
     knots_.push_back(motion_knot(std::min(first, kBeforeScan), x_, ImuInput{}));
     for (const ImuStep& s : steps) {
         if (!(s.dt > 0.0)) continue;
-        propagate(x_, P_, s, s.dt, noise_over(s.dt, noise_scale), true);
+        const Mat12 Q = noise_over(s.dt, noise_scale);
+        propagate(x_, P_, s, s.dt, Q, true);
+        noise += s.dt * s.dt * Q;
         knots_.push_back(motion_knot(s.offset, x_, s));
         steps_.push_back(s);
     }
+    if (uncertainty_.begun()) uncertainty_.predict(before, x_, steps, noise);
 }
 
 /// The graph's attitude follows gravity and the matched one the map; they may differ by a small

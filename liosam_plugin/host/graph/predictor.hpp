@@ -7,6 +7,7 @@
 
 #include "config.hpp"
 #include "d2lio/host/imu_intake.hpp"
+#include "d2lio/host/pose_uncertainty.hpp"
 #include "d2lio/host/rest_start.hpp"
 #include "imu_graph.hpp"
 
@@ -36,7 +37,13 @@ class Predictor {
     /// Takes over an estimate that contains the prediction (method noise_aware): velocity, biases
     /// and gravity follow by what they share with the pose, as in a Kalman filter.
     /// @param covariance of the estimate, absolute in the map; rotation (body), position (map).
-    void fuse(const Pose& T_map_imu, const Mat6& covariance);
+    /// @param information of the scan's own rows, same order. @param misfit see
+    /// PoseUncertainty::update().
+    void fuse(const Pose& T_map_imu, const Mat6& covariance, const Mat6& information,
+              double misfit);
+    /// See PoseUncertainty; empty unless start_filter() was called.
+    PoseUncertainty& uncertainty() { return uncertainty_; }
+    const PoseUncertainty& uncertainty() const { return uncertainty_; }
     /// Turns and moves everything with a pose that a loop has moved.
     void move(const Pose& correction);
     /// Keeps the covariance of the start (method noise_aware): the pose's grows from there on.
@@ -78,6 +85,7 @@ class Predictor {
     std::vector<MotionKnot> knots_;
     std::vector<ImuStep> steps_;
     RestStart rest_;
+    PoseUncertainty uncertainty_;
     double accel_scale_ = 1.0;  ///< readings to m/s^2
 };
 

@@ -140,6 +140,16 @@ int ScanToMap::linearise(const MatchInput& in, const Pose& T, Mat6& AtA, Vec6& A
     return used;
 }
 
+double ScanToMap::mean_square() const {
+    double squares = 0.0, weights = 0.0;
+    for (const Row& row : rows_) {
+        if (!row.used) continue;
+        squares += row.residual * row.residual;
+        weights += row.weight * row.weight;
+    }
+    return weights > 0.0 ? squares / weights : 0.0;
+}
+
 /// Takes what noise has put into the rows along blind directions out of them (method noise_aware).
 /// A line's row cannot prove anything there: of its neighbours nothing is known but the line.
 void ScanToMap::clean(const Pose& T) {
@@ -220,6 +230,7 @@ bool ScanToMap::step(const MatchInput& input, Pose& T, MatchReport& report) {
     }
     if (report.iterations == 0) find_remapping(AtA, report);
     report.information = AtA;
+    report.mean_square = mean_square();
     ++report.iterations;
     adapter_.condition_tangent({T.R.data(), T.t.data()}, options_.variance,
                                {AtA.data(), Atb.data()});

@@ -41,7 +41,8 @@ struct MatchReport {
     bool degenerate = false;  ///< some direction is weak, judged on the scan's own rows
     bool remapped = false;    ///< the host's own remapping held back some direction
     Mat6 information =
-        Mat6::Zero();  ///< A^T A of the scan's rows at the last iterate; tangent order
+        Mat6::Zero();          ///< A^T A of the scan's rows at the last iterate; tangent order
+    double mean_square = 0.0;  ///< of the rows' residuals at the last iterate, m^2
     double search_ms = 0.0;
 };
 
@@ -103,6 +104,7 @@ class ScanToMap {
     int linearise(const MatchInput& input, const Pose& T, Mat6& AtA, Vec6& Atb);
     void find_remapping(const Mat6& AtA, MatchReport& report);
     bool step(const MatchInput& input, Pose& T, MatchReport& report);
+    double mean_square() const;
     void clean(const Pose& T);
     void add_prior(const Pose& T, Mat6& AtA, Vec6& Atb) const;
     void learn_bends();
