@@ -150,10 +150,10 @@ void Adapter::Impl::clean(const Rows& rows, const Pose& x, Core& core) {
         const Vec3 n = A_t.row(row);
         const CleanedRow cleaned = cleaned_row(n, proven[k], blind, sum);
         if (cleaned.normal == n && cleaned.weight == 1.0) continue;
-        const Vec3 p_imu = x.R.transpose() * (gate.point(i).cast<double>() - x.t);
+        const Vec3 arm = gate.point(i).cast<double>() - x.t;
         const Vec3 kept = cleaned.weight * cleaned.normal;
         A_t.row(row) = kept;
-        A_r.row(row) = p_imu.cross(x.R.transpose() * kept);
+        A_r.row(row) = x.R.transpose() * arm.cross(kept);
         rows.residual[k] *= cleaned.weight;
         const bool lost = cleaned.normal != n;
         if (rows.extrinsic_column >= 0) {  // a row that lost something tells nothing of it

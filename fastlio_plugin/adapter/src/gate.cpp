@@ -13,6 +13,7 @@ void Gate::begin_scan(std::size_t points, const Vec3& sensor, bool patches) {
     planes_.resize(points);
     keeps_patches_ = patches;
     if (!patches) return;
+    planes_.assign(points, Plane{});  // no plane of the last scan passes for one of this
     sensor_ = sensor.cast<float>();
     patches_.resize(points);
     points_.resize(points);
@@ -36,6 +37,7 @@ Verdict Gate::fit(const Candidate& c, const Rejector& rejector) {
     book_.set_threshold(c.index, threshold);
     if (!(static_cast<double>(sq[0]) <= threshold * threshold)) return Verdict::kThreshold;
 
+    const Plane before = planes_[c.index];
     PlaneFitOptions options;
     options.max_distance = G::kPlaneDistance;
     if (rejector.host_gates()) options.min_spread_ratio = 0.0;  // upstream has no such check
@@ -48,7 +50,9 @@ Verdict Gate::fit(const Candidate& c, const Rejector& rejector) {
         case PlaneStatus::kOk:
             break;
     }
-    if (keeps_patches_) {
+    // The same plane to the bit is a fit to the same neighbours: a search late in a scan finds few
+    // others than the one before.
+    if (keeps_patches_ && !(planes_[c.index] == before)) {
         patches_[c.index] = make_patch(c.neighbours, static_cast<int>(c.neighbour_step),
                                        G::kNeighbours, planes_[c.index].normal, sensor_);
     }

@@ -11,6 +11,7 @@ struct Plane {
     Eigen::Vector3f normal = Eigen::Vector3f::Zero();
     float d = 0.F;
 
+    bool operator==(const Plane& o) const { return normal == o.normal && d == o.d; }
     float signed_distance(const Eigen::Vector3f& p) const { return normal.dot(p) + d; }
 };
 
