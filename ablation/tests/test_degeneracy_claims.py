@@ -4,8 +4,7 @@
 
 Both hosts run with their defaults; `none` is the same host without handling. Not claimed, because
 it does not hold: less than 7 cm between cabinets on every seed of so short a drive (1 of 16 runs of
-15 s had 19 cm), and that sigma covers the error wherever
-something, but little, is seen along the axis (cabinets, corridor, highway).
+15 s had 19 cm). What is claimed of the covariance: test_consistency.py.
 """
 
 from __future__ import annotations
