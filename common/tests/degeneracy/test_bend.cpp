@@ -131,6 +131,45 @@ TEST(BendField, ResetForgetsAtOnce) {
     EXPECT_EQ(field.at(facing), 0.F);
 }
 
+TEST(BendField, TheSpreadOfMeansPutsTheSurfaceBackWhereItWas) {
+    constexpr double kLeaf = 0.4;  // m
+    constexpr int kPoints = 100;   // of a voxel
+    test::Random random(8);
+    const Surface vault = wall(1.3);
+    BendField field;
+    int facing = 0;
+    for (int scan = 0; scan < 30; ++scan) facing = look(field, random, vault);
+    double with = 0.0, without = 0.0;
+    int counted = 0;
+    for (int trial = 0; trial < 1000; ++trial) {
+        test::Points means;
+        const auto places = test::random_places(random, 0.5);
+        for (std::size_t i = 0; i < 5; ++i) {
+            Vec3 mean = Vec3::Zero();
+            for (int k = 0; k < kPoints; ++k) {
+                mean += vault.at(places[i] + Eigen::Vector2d(random.vector(2, 0.5 * kLeaf)));
+            }
+            means.set(static_cast<int>(i), mean / kPoints);
+        }
+        const Plane plane = means.plane();
+        const Patch patch = means.patch(plane.normal);
+        if (patch.facing != facing) continue;
+        const Eigen::Vector3f p = vault.at(Eigen::Vector2d::Zero()).cast<float>();
+        const double side = static_cast<double>(patch.side);
+        const auto off = [&](double spread) {
+            const float sag = field.sag(patch, plane.normal, p, static_cast<float>(spread));
+            return side * static_cast<double>(plane.signed_distance(p) - sag);
+        };
+        with += off(mean_spread(kLeaf));
+        without += off(0.0);
+        ++counted;
+    }
+    ASSERT_GT(counted, 300);
+    const double inside = kMean * kLeaf * kLeaf / 12.0;  // 2 mm
+    EXPECT_NEAR(without / counted, -inside, 0.2 * inside);
+    EXPECT_NEAR(with / counted, 0.0, 0.2 * inside);
+}
+
 TEST(BendField, APatchThatIsNotANumberBendsNothing) {
     Patch bad;
     bad.bend_rise = bad.bend_run = std::nanf("");

@@ -131,6 +131,7 @@ SubmapOptions HostConfig::submap_options() const {
 
 MatchOptions HostConfig::match_options() const {
     MatchOptions o = matching;
+    o.map_leaf = surface_leaf;
     if (front_end == FrontEnd::kFeatures) return o;
     o.kernel_scale = kernel_scale;
     o.min_spread_ratio = PlaneFitOptions{}.min_spread_ratio;

@@ -86,7 +86,8 @@ bool ScanToMap::fit(Feature feature, std::size_t index, const Neighbours& near,
     float distance = plane.signed_distance(q);
     if (m.patch != nullptr) {
         *m.patch = make_patch(xyz, kStride, kNeighbours, plane.normal, sensor_);
-        distance -= bends_.sag(*m.patch, plane.normal, q);
+        const auto spread = static_cast<float>(mean_spread(options_.map_leaf));
+        distance -= bends_.sag(*m.patch, plane.normal, q, spread);
     }
     m.distance = static_cast<double>(distance);
     return true;

@@ -26,6 +26,7 @@ struct MatchOptions {
     double kernel_scale = 0.0;
     /// Of PlaneFitOptions; 0: neighbours on a line have a plane too, as in LIO-SAM.
     double min_spread_ratio = 0.0;
+    double map_leaf = 0.0;  ///< m, voxel whose means the map of surfaces holds; 0: single points
 };
 
 enum class MatchStatus {

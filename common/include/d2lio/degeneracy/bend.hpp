@@ -8,6 +8,11 @@
 
 namespace d2lio {
 
+/// Half the mean squared distance, in the surface, of points from their mean in a voxel (m^2):
+/// multiplied by the bend, how far the mean lies off the surface, inside the curve.
+/// @param leaf side of the voxel, m.
+constexpr double mean_spread(double leaf) { return leaf * leaf / 12.0; }
+
 /// Mean curvature of what the sensor sees, by the direction the surface faces (1/m, positive where
 /// it bends towards the sensor, as the vault of a tunnel does).
 ///
@@ -22,9 +27,11 @@ class BendField {
     float at(int facing) const { return bend_[static_cast<std::size_t>(facing)]; }
     void add(const Patch& patch);
     /// How far the surface of a patch lies from its plane at p, along the plane's normal (m).
-    float sag(const Patch& patch, const Eigen::Vector3f& normal, const Eigen::Vector3f& p) const {
+    /// @param spread of mean_spread(), where the neighbours are means.
+    float sag(const Patch& patch, const Eigen::Vector3f& normal, const Eigen::Vector3f& p,
+              float spread = 0.F) const {
         const float bend = at(patch.facing);
-        return bend == 0.F ? 0.F : patch.side * bend * patch.sag(normal, p);
+        return bend == 0.F ? 0.F : patch.side * bend * (patch.sag(normal, p) - spread);
     }
     /// Closes a scan: older ones fade with a time constant of ten scans.
     void end_scan();
