@@ -202,6 +202,28 @@ TEST(NoiseAware, ManyFacesMakeItSeeing) {
     EXPECT_FALSE(s.touched());
 }
 
+TEST(NoiseAware, AnAxisThatWasBlindStaysSoWhileItWavers) {
+    const Tunnel wavering(8);
+    const auto leaks = [&](Adapter& a) {
+        const Solved s = solve(a, wavering);
+        EXPECT_GT(s.told.noise_share[0], 0.2);
+        EXPECT_LT(s.told.noise_share[0], 0.4);
+        return s.after.bottomRows(s.after.rows() - 8).col(0).norm();  // of the tunnel's own rows
+    };
+    Adapter a;
+    const double at_first = leaks(noise_aware(a));
+    EXPECT_GT(at_first, 0.1);
+    solve(a, Tunnel(0));
+    EXPECT_LT(leaks(a), 1e-9);
+    EXPECT_LT(leaks(a), 1e-9);
+    solve(a, Tunnel(30));  // seen in between
+    EXPECT_EQ(leaks(a), at_first);
+    solve(a, Tunnel(0));
+    a.reset();
+    pass_scans(a, kSettling);
+    EXPECT_EQ(leaks(a), at_first);
+}
+
 TEST(NoiseAware, RotationFollowsTheCleanedNormal) {
     Adapter a;
     const Tunnel t(0);

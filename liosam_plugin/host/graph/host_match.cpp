@@ -96,9 +96,11 @@ void Host::Impl::correct(const Pose& estimate, ScanResult& r) {
 
 void Host::Impl::fuse(const Pose& estimate, ScanResult& r) {
     const bool held = predictor_.hold(estimate, matched(), r.diagnostics);
-    if (!held && matched())
-        predictor_.fuse(estimate, covariance_, report_.information / config_.matching.variance,
-                        report_.mean_square / config_.matching.variance);
+    if (!held && matched()) {
+        const double variance = config_.matching.variance;
+        predictor_.fuse(estimate, covariance_, report_.information / variance,
+                        report_.mean_square / variance);
+    }
     previous_ = predictor_.state().T_map_imu();
     covariance_ = predictor_.covariance();
 }
