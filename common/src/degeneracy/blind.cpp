@@ -13,6 +13,7 @@ namespace {
 constexpr double kElongation = 4.0;  ///< of P, smallest ratio of its largest variances
 constexpr double kDistinct = 0.3;    ///< sine of the least angle between two blind axes
 constexpr double kCosCone = 0.966;   ///< cos 15 deg: within it the filter's axis is taken
+constexpr double kWavering = 0.5;    ///< blend above which a direction that was blind stays so
 constexpr double kSameAxis = 0.9;    ///< cosine between the axes of one direction in two scans
 /// The test of a row is soft: between these multiples of the threshold it fades.
 constexpr double kSoftFrom = 0.7, kSoftTo = 1.3;
@@ -75,6 +76,7 @@ BlindDirections find_blind(const NoiseShare& share, const Mat3& P_t,
 
 void stay_blind(const BlindDirections& before, BlindDirections& now) {
     for (int i = 0; i < now.count; ++i) {
+        if (!(now.blend[i] > kWavering)) continue;
         for (int j = 0; j < before.count; ++j) {
             const bool same = std::abs(now.axes.col(i).dot(before.axes.col(j))) > kSameAxis;
             if (same) now.blend[i] = std::max(now.blend[i], before.blend[j]);

@@ -59,9 +59,9 @@ class SurfaceSums {
 BlindDirections find_blind(const NoiseShare& share, const Mat3& P_t,
                            const NoiseAwareConfig& config);
 
-/// A direction that was blind in the scan before stays as blind as it was, until the noise's share
-/// falls below config.share_low: what leaks in while it wavers would claim to be a measurement, and
-/// move the map along.
+/// A direction that was blind in the scan before stays as blind as it was while its share is in the
+/// upper half between config.share_low and share_high: what leaks in while it wavers would claim to
+/// be a measurement, and move the map along.
 void stay_blind(const BlindDirections& before, BlindDirections& now);
 
 /// A row after cleaning.
