@@ -142,7 +142,7 @@ def test_no_two_sequences_of_a_suite_are_the_same() -> None:
     for name in shipped():
         suite = load_suite(name)
         made = [
-            (s.simulate.scene, s.simulate.sensor, seed)
+            (s.simulate.scene, s.simulate.sensor, s.simulate.imu, seed)
             for s in suite.sequences
             if s.simulate is not None
             for seed in range(s.simulate.seed_base, s.simulate.seed_base + suite.repeats)
