@@ -3,6 +3,7 @@
 #include <benchmark/benchmark.h>
 
 #include "d2lio/fastlio/adapter.hpp"
+#include "d2lio/fastlio/host.hpp"
 #include "drive.hpp"
 
 namespace d2lio::fastlio {

@@ -2,6 +2,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
+#include <algorithm>
 #include <cmath>
 #include <vector>
 
@@ -18,6 +19,7 @@ class SyntheticRoom {
     static constexpr Stamp kStart = 86'400'000'000'000;
     static constexpr Stamp kImuPeriod = 5'000'000, kScanPeriod = 100'000'000;
     Vec3 half{5.65, 4.6, 1.35};  ///< half extents, m
+    double pipe = 0.0;               ///< radius of a round tunnel along x instead of the walls, m
     int columns = 180, rings = 16;
 
     static Pose T_imu_lidar() { return {exp_so3(Vec3(0.01, -0.02, 0.03)), Vec3(0.03, 0.05, 0.08)}; }
@@ -63,22 +65,29 @@ class SyntheticRoom {
     }
     Vec3 normal3() { return {random_.normal(), random_.normal(), random_.normal()}; }
 
+    /// Of a ray from t along w to what surrounds it, m.
+    double range(const Vec3& t, const Vec3& w) const {
+        double nearest = 1e9;
+        for (int a = 0; a < (pipe > 0.0 ? 1 : 3); ++a) {
+            const double wall = w[a] > 0 ? half[a] : -half[a];
+            if (std::abs(w[a]) > 1e-9) nearest = std::min(nearest, (wall - t[a]) / w[a]);
+        }
+        if (!(pipe > 0.0)) return nearest;
+        const double ww = w.tail<2>().squaredNorm(), tw = t.tail<2>().dot(w.tail<2>());
+        const double rest = pipe * pipe - t.tail<2>().squaredNorm();
+        return std::min(nearest, (std::sqrt(tw * tw + ww * rest) - tw) / ww);
+    }
+
     LidarPoint cast(const Pose& T, std::int32_t dt, int column, int ring) {
         const double azimuth = 2.0 * 3.14159265358979 * column / columns;
         const double elevation = (ring - 0.5 * (rings - 1)) * 4.0 * 3.14159265358979 / 180.0;
         const Vec3 d(std::cos(elevation) * std::cos(azimuth),
                      std::cos(elevation) * std::sin(azimuth), std::sin(elevation));
-        const Vec3 w = T.R * d;
-        double range = 1e9;
-        for (int a = 0; a < 3; ++a) {
-            const double wall = w[a] > 0 ? half[a] : -half[a];
-            if (std::abs(w[a]) > 1e-9) range = std::min(range, (wall - T.t[a]) / w[a]);
-        }
-        range += noise_ * random_.normal();
+        const double r = range(T.t, T.R * d) + noise_ * random_.normal();
         LidarPoint p;
-        p.x = static_cast<float>(range * d.x());
-        p.y = static_cast<float>(range * d.y());
-        p.z = static_cast<float>(range * d.z());
+        p.x = static_cast<float>(r * d.x());
+        p.y = static_cast<float>(r * d.y());
+        p.z = static_cast<float>(r * d.z());
         p.dt_ns = dt;
         p.ring = static_cast<std::uint16_t>(ring);
         return p;
