@@ -16,9 +16,9 @@ HostConfig small_box() {
     return c;
 }
 
-Neighbours found(const IkdTree& tree, const Eigen::Vector3f& p) {
-    Neighbours n;
-    tree.knn(p, 5, std::numeric_limits<float>::infinity(), n);
+Nearest found(const IkdTree& tree, const Eigen::Vector3f& p) {
+    Nearest n;
+    n.count = tree.knn(p, Nearest::kMost, std::numeric_limits<float>::infinity(), n.items.data());
     return n;
 }
 

@@ -53,30 +53,28 @@ inline void leaf_distances(const ikd::Leaf& leaf, const Query& q, float* sq_dist
 /// Keeps the k best in ascending order.
 class Best {
   public:
-    Best(Neighbours& out, int k, float max_sq_dist) : out_(out), k_(k), worst_(max_sq_dist) {
-        out_.count = 0;
-    }
+    Best(Neighbour* items, int k, float max_sq_dist) : items_(items), k_(k), worst_(max_sq_dist) {}
+    int count() const { return count_; }
     /// Points and boxes farther than this cannot change the result.
     float worst() const { return worst_; }
 
     void offer(const Neighbour& n) {
-        Neighbour* const items = out_.items.data();
-        int i = out_.count;
+        int i = count_;
         if (i < k_) {
-            ++out_.count;
-        } else if (before(n, items[k_ - 1])) {
+            ++count_;
+        } else if (before(n, items_[k_ - 1])) {
             i = k_ - 1;
         } else {
             return;
         }
-        for (; i > 0 && before(n, items[i - 1]); --i) items[i] = items[i - 1];
-        items[i] = n;
-        if (out_.count == k_) worst_ = items[k_ - 1].sq_dist;
+        for (; i > 0 && before(n, items_[i - 1]); --i) items_[i] = items_[i - 1];
+        items_[i] = n;
+        if (count_ == k_) worst_ = items_[k_ - 1].sq_dist;
     }
 
   private:
-    Neighbours& out_;
-    int k_;
+    Neighbour* items_;
+    int k_, count_ = 0;
     float worst_;
 };
 
@@ -98,8 +96,12 @@ struct Pending {
 }  // namespace
 
 void IkdTree::knn(const Eigen::Vector3f& query, int k, float max_sq_dist, Neighbours& out) const {
-    Best best(out, std::clamp(k, 1, Neighbours::kMax), max_sq_dist);
-    if (empty() || !query.allFinite()) return;
+    out.count = knn(query, std::clamp(k, 1, Neighbours::kMax), max_sq_dist, out.items.data());
+}
+
+int IkdTree::knn(const Eigen::Vector3f& query, int k, float max_sq_dist, Neighbour* out) const {
+    if (k < 1 || empty() || !query.allFinite()) return 0;
+    Best best(out, k, max_sq_dist);
     const Query q = query_of(query);
     std::array<Pending, ikd::kMaxDepth> stack;
     std::size_t top = 0;
@@ -118,6 +120,7 @@ void IkdTree::knn(const Eigen::Vector3f& query, int k, float max_sq_dist, Neighb
         }
         scan_leaf(pool_.leaf(*e), e->count, q, best);
     }
+    return best.count();
 }
 
 std::size_t IkdTree::radius_search(const Eigen::Vector3f& query, float radius,

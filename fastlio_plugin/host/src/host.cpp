@@ -309,7 +309,7 @@ void Host::Impl::judge(UpdateStatus status, ScanResult& r) {
 }
 
 void Host::Impl::grow_map(const MeasureGroup& group, ScanResult& r) {
-    static const std::vector<Neighbours> kNoNeighbours;
+    static const std::vector<Nearest> kNoNeighbours;
     const bool settled = seconds_between(group.begin, first_begin_) >= kInitTime;
     const auto fill =
         r.diagnostics.blind > 0 ? LocalMap::Fill::kEmpty : LocalMap::Fill::kNearestToCentre;

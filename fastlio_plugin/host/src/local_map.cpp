@@ -24,8 +24,8 @@ Eigen::Vector3f voxel_centre(const Eigen::Vector3f& p, float side) {
 enum class Insertion { kByVoxel, kApart, kNone };
 
 /// Whether the voxel of a point has one that bars it.
-bool taken(const Eigen::Vector3f& p, const Eigen::Vector3f& centre, const Neighbours& near,
-           float side, LocalMap::Fill fill) {
+bool taken(const Eigen::Vector3f& p, const Eigen::Vector3f& centre, const Nearest& near, float side,
+           LocalMap::Fill fill) {
     const float own = (p - centre).squaredNorm();
     for (int i = 0; i < near.count; ++i) {
         const Eigen::Vector3f off = near[i].point() - centre;
@@ -37,8 +37,7 @@ bool taken(const Eigen::Vector3f& p, const Eigen::Vector3f& centre, const Neighb
     return false;
 }
 
-Insertion decide(const Eigen::Vector3f& p, const Neighbours& near, float side,
-                 LocalMap::Fill fill) {
+Insertion decide(const Eigen::Vector3f& p, const Nearest& near, float side, LocalMap::Fill fill) {
     if (near.count == 0) return Insertion::kByVoxel;
     const Eigen::Vector3f centre = voxel_centre(p, side);
     const Eigen::Array3f off = (near[0].point() - centre).cwiseAbs().array();
@@ -92,7 +91,7 @@ void LocalMap::follow(const Vec3& lidar) {
 }
 
 std::size_t LocalMap::insert(const std::vector<Eigen::Vector3f>& points,
-                             const std::vector<Neighbours>& neighbours, Fill fill) {
+                             const std::vector<Nearest>& neighbours, Fill fill) {
     if (neighbours.empty()) {
         tree_.insert(points, true);
         return points.size();

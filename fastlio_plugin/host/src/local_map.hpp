@@ -6,6 +6,7 @@
 
 #include "d2lio/fastlio/config.hpp"
 #include "d2lio/map/ikd_tree.hpp"
+#include "nearest.hpp"
 
 namespace d2lio::fastlio {
 
@@ -30,8 +31,7 @@ class LocalMap {
     /// be empty (all go in).
     /// @returns how many points were found to belong in
     std::size_t insert(const std::vector<Eigen::Vector3f>& points,
-                       const std::vector<Neighbours>& neighbours,
-                       Fill fill = Fill::kNearestToCentre);
+                       const std::vector<Nearest>& neighbours, Fill fill = Fill::kNearestToCentre);
 
   private:
     IkdTree tree_;

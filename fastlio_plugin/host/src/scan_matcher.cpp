@@ -10,7 +10,6 @@
 namespace d2lio::fastlio {
 namespace {
 
-constexpr int kNeighbours = 5;
 /// Far neighbours are of no use to the match, but the map's insertion rule looks at them too.
 constexpr float kUnbounded = std::numeric_limits<float>::infinity();
 
@@ -29,13 +28,20 @@ void ScanMatcher::begin(const std::vector<Eigen::Vector3f>& points, const IkdTre
     search_ms_ = 0.0;
 }
 
+void ScanMatcher::look_up(std::size_t i, const NavState& x) {
+    const Eigen::Vector3f& p = (*points_)[i];
+    const Vec3 p_imu = x.extrinsic_rot * p.cast<double>() + x.extrinsic_pos;
+    in_map_[i] = (x.rot * p_imu + x.pos).cast<float>();
+    Nearest& near = neighbours_[i];
+    near.count = tree_->knn(in_map_[i], Nearest::kMost, kUnbounded, near.items.data());
+}
+
 void ScanMatcher::match(std::size_t i, const NavState& x, bool search) {
     if (!search && verdicts_[i] != Verdict::kAccepted) return;  // out until the next search
     const Eigen::Vector3f& p = (*points_)[i];
     const Vec3 p_imu = x.extrinsic_rot * p.cast<double>() + x.extrinsic_pos;
     in_map_[i] = (x.rot * p_imu + x.pos).cast<float>();
-    Neighbours& near = neighbours_[i];
-    if (search) tree_->knn(in_map_[i], kNeighbours, kUnbounded, near);
+    const Nearest& near = neighbours_[i];
     Candidate c{};
     c.index = i;
     c.fresh = search;
@@ -82,6 +88,7 @@ void ScanMatcher::append_prior(const NavState& x, Linearisation& out) {
 
 bool ScanMatcher::measure(const NavState& x, bool search, Linearisation& out) {
     StopWatch watch;
+    if (search) loop_(points_->size(), [&](std::size_t i) { look_up(i, x); });
     loop_(points_->size(), [&](std::size_t i) { match(i, x, search); });
     search_ms_ += watch.lap();
     constexpr Eigen::Index kPriorRows = 6;

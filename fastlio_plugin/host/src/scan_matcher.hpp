@@ -9,6 +9,7 @@
 #include "d2lio/host/stop_watch.hpp"
 #include "d2lio/map/ikd_tree.hpp"
 #include "ieskf.hpp"
+#include "nearest.hpp"
 
 namespace d2lio::fastlio {
 
@@ -24,10 +25,11 @@ class ScanMatcher {
     bool measure(const NavState& x, bool search, Linearisation& out);
     /// Moves all points to the map frame under x.
     const std::vector<Eigen::Vector3f>& to_map(const NavState& x);
-    const std::vector<Neighbours>& neighbours() const { return neighbours_; }
+    const std::vector<Nearest>& neighbours() const { return neighbours_; }
     double search_ms() const { return search_ms_; }
 
   private:
+    void look_up(std::size_t i, const NavState& x);
     void match(std::size_t i, const NavState& x, bool search);
     void fill_row(const NavState& x, std::size_t i, Linearisation& out, Eigen::Index row) const;
     void append_prior(const NavState& x, Linearisation& out);
@@ -38,7 +40,7 @@ class ScanMatcher {
     PointLoop loop_;
     const std::vector<Eigen::Vector3f>* points_ = nullptr;
     const IkdTree* tree_ = nullptr;
-    std::vector<Neighbours> neighbours_;
+    std::vector<Nearest> neighbours_;
     std::vector<Correspondence> matches_;
     std::vector<Verdict> verdicts_;
     std::vector<Eigen::Vector3f> in_map_;

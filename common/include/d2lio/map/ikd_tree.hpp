@@ -84,6 +84,8 @@ class IkdTree {
     /// The up to `k` nearest points with squared distance <= `max_sq_dist`, k in 1..32 (clamped).
     /// A non-finite query finds nothing. No allocation.
     void knn(const Eigen::Vector3f& query, int k, float max_sq_dist, Neighbours& out) const;
+    /// The same into storage for `k` of any number; returns how many were found.
+    int knn(const Eigen::Vector3f& query, int k, float max_sq_dist, Neighbour* out) const;
     /// All points with distance <= `radius` m, ascending; returns their number.
     std::size_t radius_search(const Eigen::Vector3f& query, float radius,
                               std::vector<Neighbour>& out) const;
