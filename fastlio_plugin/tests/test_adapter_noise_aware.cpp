@@ -202,6 +202,21 @@ TEST(NoiseAware, ManyFacesMakeItSeeing) {
     EXPECT_FALSE(s.touched());
 }
 
+TEST(NoiseAware, AScanAfterOneThatSawWellIsLookedAtByASampleAndJudgedFromTheNextOn) {
+    Adapter a;
+    EXPECT_LT(solve(noise_aware(a), Tunnel(60)).told.noise_share[0], 0.1);
+    const Solved entering = solve(a, Tunnel(0));
+    EXPECT_GT(entering.told.noise_share[0], 0.4);
+    EXPECT_EQ(entering.told.blind, 0);
+    EXPECT_FALSE(entering.touched());
+    const Solved inside = solve(a, Tunnel(0));
+    EXPECT_EQ(inside.told.blind, 1);
+    EXPECT_TRUE(inside.touched());
+    const Solved leaving = solve(a, Tunnel(60));  // every surface is looked at once more
+    EXPECT_EQ(leaving.told.blind, 0);
+    EXPECT_FALSE(leaving.touched());
+}
+
 TEST(NoiseAware, AnAxisThatWasBlindStaysSoWhileItWavers) {
     const Tunnel wavering(8);
     const auto leaks = [&](Adapter& a) {
@@ -217,6 +232,7 @@ TEST(NoiseAware, AnAxisThatWasBlindStaysSoWhileItWavers) {
     EXPECT_LT(leaks(a), 1e-9);
     EXPECT_LT(leaks(a), 1e-9);
     solve(a, Tunnel(30));  // seen in between
+    solve(a, wavering);    // what follows is looked at by a sample
     EXPECT_EQ(leaks(a), at_first);
     solve(a, Tunnel(0));
     a.reset();

@@ -14,7 +14,7 @@ namespace {
 constexpr double kRoomError = 0.05;  // m, over 4 s with 1 cm range noise
 
 const char* const kModes[] = {"off", "none", "fixed", "kiss", "point_adaptive"};
-const char* const kMethods[] = {"none", "paper", "remap", "noise_aware"};
+const char* const kMethods[] = {"none", "paper", "remap", "tsvd", "xicp", "noise_aware"};
 
 bool same(const ScanResult& a, const ScanResult& b) {
     return a.stamp == b.stamp && a.status == b.status && a.state.pos == b.state.pos &&

@@ -218,7 +218,7 @@ TEST(LioSamAdapter, PriorIsTheGradientOfItsCostInLioSamsVariables) {
 
 TEST(LioSamAdapter, BothSetsOfVariablesTakeTheSameStep) {
     Scene s;
-    for (const char* method : {"none", "paper", "remap"}) {
+    for (const char* method : {"none", "paper", "remap", "tsvd"}) {
         Adapter a;
         ASSERT_TRUE(a.set("degeneracy.method", method));
         a.begin_scan(s.input());
@@ -252,6 +252,35 @@ TEST(LioSamAdapter, RemapReturnsWeakDirectionsToThePrediction) {
     const Vec3 weak = a.diagnostics().v_t.col(0);
     EXPECT_NEAR(weak.dot(step.tail<3>()), -weak.dot(x.t - s.predicted.t), 1e-6);
     EXPECT_GT(std::abs(weak.x()), 0.99);
+}
+
+TEST(LioSamAdapter, XIcpCountsTheRowsItIsShownAndDoesNothingWithoutThem) {
+    Scene s(2.0);
+    Adapter a;
+    ASSERT_TRUE(a.set("degeneracy.method", "xicp"));
+    EXPECT_TRUE(a.counts_rows());
+    a.begin_scan(s.input());
+    const Vec3 shift(0.3, 0.1, -0.2);
+    const Vec3 t = s.predicted.t + shift;
+    const PoseView at{s.predicted.R.data(), t.data()};
+    Mat6 AtA = s.AtA;
+    Vec6 Atb = s.Atb;
+    a.condition_tangent(at, kVariance, {AtA.data(), Atb.data()});
+    EXPECT_EQ(AtA, s.AtA);
+    EXPECT_EQ(Atb, s.Atb);
+    std::vector<Vec6> rows;  // two hundred in each direction but x
+    for (int i = 0; i < 1200; ++i) {
+        if (i % 6 != 3) rows.push_back(Vec6::Unit(i % 6));
+    }
+    const int count = static_cast<int>(rows.size());
+    const RowView view{{rows[0].data(), count, 6, 1}, {rows[0].data() + 3, count, 6, 1}};
+    a.condition_tangent(at, kVariance, {AtA.data(), Atb.data(), &view});
+    a.end_scan(at, true);
+    const Vec3 weak = a.diagnostics().v_t.col(0);
+    EXPECT_GT(std::abs(weak.x()), 0.98);
+    const Vec6 step = AtA.ldlt().solve(Atb);
+    EXPECT_NEAR(weak.dot(step.tail<3>()), -weak.dot(shift), 1e-6);
+    EXPECT_GT((step.tail<3>() + shift).norm(), 0.1);  // the other directions are the scan's
 }
 
 TEST(LioSamAdapter, DegenerateFlagIsOfTheRowsAloneHoweverStrongThePrior) {

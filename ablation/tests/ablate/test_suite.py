@@ -113,7 +113,15 @@ def test_shipped_suites_name_what_there_is(name: str) -> None:
     for variant in suite.variants:
         assert variant.import_ or variant.host in HOSTS or variant.host in PEERS
         assert variant.rejection in (None, *REJECTION_MODES)
-        assert variant.degeneracy in (None, "none", "paper", "remap", "noise_aware")
+        assert variant.degeneracy in (
+            None,
+            "none",
+            "paper",
+            "remap",
+            "tsvd",
+            "xicp",
+            "noise_aware",
+        )
 
 
 @pytest.mark.parametrize(("name", "repeats"), [("table1", 5), ("table2", 5)])

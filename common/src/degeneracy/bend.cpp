@@ -22,7 +22,7 @@ double shrunk(double bend, double variance) {
 }  // namespace
 
 void BendField::add(const Patch& patch) {
-    const auto i = static_cast<std::size_t>(patch.facing);
+    const auto i = static_cast<std::size_t>(patch.side.facing);
     rise_[i] += static_cast<double>(patch.bend_rise);
     run_[i] += static_cast<double>(patch.bend_run);
 }

@@ -18,8 +18,10 @@ constexpr double kSameAxis = 0.9;    ///< cosine between the axes of one directi
 /// The test of a row is soft: between these multiples of the threshold it fades.
 constexpr double kSoftFrom = 0.7, kSoftTo = 1.3;
 constexpr double kSpeaks = 0.05;  ///< component from which on a row speaks of a blind direction
-constexpr double kSharedWeight = 0.5;  ///< of a row that does, if it is the only one
-constexpr double kFew = 20.0;          ///< rows' worth of proven information that is little
+constexpr double kSharedWeight = 0.5;         ///< of a row that does, if it is the only one
+constexpr double kMapVariance = 0.03 * 0.03;  ///< m^2, of the map along a blind direction
+constexpr double kSurprise = 3.0;             ///< sigmas at which a row's weight is halved
+constexpr double kFew = 20.0;                 ///< rows' worth of proven information that is little
 
 Vec3 steadied(const Vec3& axis, const BlockSpectrum& P) {
     const Vec3 longest = P.v.col(2);
@@ -38,19 +40,10 @@ Vec3 rest_of(Vec3 axis, const BlindDirections& blind, int count) {
 
 }  // namespace
 
-void SurfaceSums::add(const Vec3& normal, const Patch& patch) {
-    const double x = normal.x(), y = normal.y(), z = normal.z();
-    const Upper n{x * x, x * y, x * z, y * y, y * z, z * z};
-    for (std::size_t i = 0; i < n.size(); ++i) {
-        n_[i] += n[i];
-        c_[i] += static_cast<double>(patch.covariance[i]);
-    }
-}
-
 Mat3 SurfaceSums::symmetric(const Upper& u) {
-    Mat3 m;
-    m << u[0], u[1], u[2], u[1], u[3], u[4], u[2], u[4], u[5];
-    return m;
+    Eigen::Matrix3f m;
+    m << u.xx, u.xy, u.xz, u.xy, u.yy, u.yz, u.xz, u.yz, u.zz;
+    return m.cast<double>();
 }
 
 BlindDirections find_blind(const NoiseShare& share, const Mat3& P_t,
@@ -71,6 +64,10 @@ BlindDirections find_blind(const NoiseShare& share, const Mat3& P_t,
         if (d.norm() < kDistinct && left.norm() > d.norm()) d = left;
         out.axes.col(i) = d.normalized();
     }
+    for (int i = 0; i < out.count; ++i) {
+        const Vec3 d = out.axes.col(i);
+        out.variance[i] = std::max(d.dot(P_t * d), 0.0);
+    }
     return out;
 }
 
@@ -84,16 +81,22 @@ void stay_blind(const BlindDirections& before, BlindDirections& now) {
     }
 }
 
+ProofTest::ProofTest(const BlindDirections& blind, const NoiseAwareConfig& config)
+    : axes_(blind.axes.cast<float>()),
+      count_(blind.count),
+      // A little less than the test itself asks for: single precision decides nothing here.
+      least_(0.99F * static_cast<float>(kSoftFrom * config.significance * config.significance)) {}
+
 Vec3 proven_share(const Vec3& normal, const Patch& patch, const BlindDirections& blind,
                   const NoiseAwareConfig& config) {
     const double k = config.significance * config.significance;
     Vec3 share = Vec3::Zero();
     for (int i = 0; i < blind.count; ++i) {
         const Vec3 d = blind.axes.col(i);
-        const double a = normal.dot(d);
-        const double limit = k * patch.variance_along(d, a);
-        const bool clear = a * a >= kSoftTo * limit;  // also of a fit without any uncertainty
-        share[i] = clear ? 1.0 : smooth_step(a * a / limit, kSoftFrom, kSoftTo);
+        const double square = std::pow(normal.dot(d), 2);
+        const double limit = k * patch.variance_along(d, normal);
+        const bool clear = square >= kSoftTo * limit;  // also of a fit without any uncertainty
+        share[i] = clear ? 1.0 : smooth_step(square / limit, kSoftFrom, kSoftTo);
     }
     return share;
 }
@@ -105,8 +108,20 @@ void ProvenSum::add(const Vec3& normal, const Vec3& share, const BlindDirections
     }
 }
 
+double trust(double residual, const Vec3& normal, const Patch& patch, const BlindDirections& blind,
+             double variance) {
+    double S = variance + static_cast<double>(patch.variance);
+    for (int i = 0; i < blind.count; ++i) {
+        const double a = normal.dot(blind.axes.col(i));
+        S += a * a * (blind.variance[i] + kMapVariance);
+    }
+    const double allowed = kSurprise * kSurprise * S;
+    const double out = allowed / (allowed + residual * residual);
+    return std::isfinite(out) ? out : 0.0;
+}
+
 CleanedRow cleaned_row(const Vec3& normal, const Vec3& share, const BlindDirections& blind,
-                       const ProvenSum& sum) {
+                       const ProvenSum& sum, double trusted) {
     CleanedRow out{normal, 1.0};
     double speaks = 0.0, alone = 0.0;
     for (int i = 0; i < blind.count; ++i) {
@@ -117,7 +132,9 @@ CleanedRow cleaned_row(const Vec3& normal, const Vec3& share, const BlindDirecti
         speaks += proven;
         alone += proven * kFew / (kFew + sum.information[i]);
     }
-    out.weight = 1.0 - (1.0 - kSharedWeight) * alone / (kSpeaks * kSpeaks + speaks);
+    const double all = kSpeaks * kSpeaks + speaks;
+    out.weight = 1.0 - (1.0 - kSharedWeight) * alone / all;
+    out.weight *= 1.0 - (1.0 - trusted) * speaks / all;
     return out;
 }
 

@@ -10,6 +10,7 @@
 namespace d2lio {
 namespace {
 
+using Eigen::Matrix3f;
 using Eigen::Vector3f;
 
 constexpr float kMinScatter = 1e-6F;  ///< m^2
@@ -19,162 +20,176 @@ constexpr float kMostVariance = 1.F;  ///< rad^2, of the normal along any axis
 constexpr float kMostDoubt = 1.F;     ///< rad
 constexpr float kMinFreedom = 1e-3F;  ///< 1 - leverage of a point
 
-/// N points in the plane's own axes, coordinate by coordinate.
-template <int N>
+/// Symmetric 3x3: xx, xy, xz, yy, yz, zz.
+using Upper = std::array<float, 6>;
+
+Vector3f multiply(const Upper& u, const Vector3f& v) {
+    return {u[0] * v.x() + u[1] * v.y() + u[2] * v.z(), u[1] * v.x() + u[3] * v.y() + u[4] * v.z(),
+            u[2] * v.x() + u[4] * v.y() + u[5] * v.z()};
+}
+
+/// A scatter seen in the plane, where it has rank two.
 struct InPlane {
-    using Numbers = Eigen::Array<float, N, 1>;
-
-    Vector3f e1, e2, centroid;
-    Numbers u, v;    ///< m, from the centroid
-    Numbers height;  ///< m, from the centroid, towards the sensor
-    float variance;  ///< m^2, of a height about the surface's tangent plane
-    float a, b, d;   ///< inverse of the scatter of (u, v), m^-2: (a, b; b, d)
-
-    InPlane(const float* xyz, int stride, const Vector3f& normal, const Vector3f& towards);
+    Upper inverse;  ///< pseudo-inverse, m^-2
+    float trace;    ///< m^2
+    float height;   ///< n . S n, m^2
 };
 
-template <int N>
-InPlane<N>::InPlane(const float* xyz, int stride, const Vector3f& normal, const Vector3f& towards)
-    : e1(normal.unitOrthogonal()), e2(normal.cross(e1)) {
-    Numbers x, y, z;
-    for (int i = 0; i < N; ++i) {
+/// With B the part of S in the plane: (tr(B) (I - n n^T) - B) / det, det the product of its two
+/// eigenvalues, the sum of its principal minors.
+inline InPlane in_plane(const Upper& S, const Vector3f& n) {
+    const float x = n.x(), y = n.y(), z = n.z();
+    const Vector3f Sn = multiply(S, n);
+    const float height = x * Sn.x() + y * Sn.y() + z * Sn.z();
+    const float lx = Sn.x() - height * x, ly = Sn.y() - height * y, lz = Sn.z() - height * z;
+    const float hx = height * x + 2.F * lx, hy = height * y + 2.F * ly, hz = height * z + 2.F * lz;
+    const float xx = S[0] - x * hx, yy = S[3] - y * hy, zz = S[5] - z * hz;
+    const float xy = S[1] - lx * y - x * (ly + height * y);
+    const float xz = S[2] - lx * z - x * (lz + height * z);
+    const float yz = S[4] - ly * z - y * (lz + height * z);
+    const float trace = xx + yy + zz, raised = trace + kMinScatter;
+    const float minors = (xx * yy - xy * xy) + (xx * zz - xz * xz) + (yy * zz - yz * yz);
+    const float per_det = 1.F / std::max(minors + kMinScatter * raised, kMinScatter * raised);
+    const float k = raised * per_det;
+    return {{k * (1.F - x * x) - per_det * xx, -k * x * y - per_det * xy, -k * x * z - per_det * xz,
+             k * (1.F - y * y) - per_det * yy, -k * y * z - per_det * yz,
+             k * (1.F - z * z) - per_det * zz},
+            trace,
+            height};
+}
+
+/// With no eigenvalue above kMostVariance; the smallest one, that along the normal, is zero.
+Upper capped(const Upper& C) {
+    Matrix3f m;
+    m << C[0], C[1], C[2], C[1], C[3], C[4], C[2], C[4], C[5];
+    const Eigen::SelfAdjointEigenSolver<Matrix3f> eigen(m);
+    const Matrix3f V = eigen.eigenvectors();
+    Vector3f variances = eigen.eigenvalues().cwiseMin(kMostVariance);
+    variances[0] = 0.F;
+    m = V * variances.asDiagonal() * V.transpose();
+    return {m(0, 0), m(0, 1), m(0, 2), m(1, 1), m(1, 2), m(2, 2)};
+}
+
+int facing_of(const Vector3f& n) {
+    const auto quarter = [](float v) {  // sums of comparisons need no branch
+        return static_cast<int>(v >= -0.5F) + static_cast<int>(v >= 0.F) +
+               static_cast<int>(v >= 0.5F);
+    };
+    return (quarter(n.x()) * 4 + quarter(n.y())) * 4 + quarter(n.z());
+}
+
+/// Sums over the offsets of the neighbours, h half the squared length of each.
+struct HalfSquares {
+    float sum = 0.F, squares = 0.F;   ///< of h, h^2
+    float x = 0.F, y = 0.F, z = 0.F;  ///< of h times the offset
+};
+
+HalfSquares copy_offsets(const float* xyz, int stride, const Vector3f& n, Patch& patch) {
+    HalfSquares out;
+    const float cx = patch.centroid.x(), cy = patch.centroid.y(), cz = patch.centroid.z();
+    for (int i = 0; i < Patch::kCount; ++i) {
         const float* const p = xyz + i * stride;
-        x[i] = p[0];
-        y[i] = p[1];
-        z[i] = p[2];
+        float* const o = patch.offsets.data() + 3 * i;
+        const float x = p[0] - cx, y = p[1] - cy, z = p[2] - cz;
+        o[0] = x;
+        o[1] = y;
+        o[2] = z;
+        const float h = n.x() * x + n.y() * y + n.z() * z;
+        const float half = 0.5F * (x * x + y * y + z * z - h * h);
+        out.sum += half;
+        out.squares += half * half;
+        out.x += half * x;
+        out.y += half * y;
+        out.z += half * z;
     }
-    centroid = Vector3f(x.mean(), y.mean(), z.mean());
-    x -= centroid.x();
-    y -= centroid.y();
-    z -= centroid.z();
-    u = e1.x() * x + e1.y() * y + e1.z() * z;
-    v = e2.x() * x + e2.y() * y + e2.z() * z;
-    height = towards.x() * x + towards.y() * y + towards.z() * z;
-    const float residual = height.square().sum() / std::max(N - 3, 1);
-    const float uu = u.square().sum() + kMinScatter, vv = v.square().sum() + kMinScatter;
-    const float uv = (u * v).sum();
-    const float bend = 0.5F * kUnknownBend * (uu + vv) / N;
-    variance = std::max(kPointSigma * kPointSigma, residual) + bend * bend;
-    const float per_det = 1.F / std::max(uu * vv - uv * uv, kMinScatter * (uu + vv));
-    a = vv * per_det;
-    b = -uv * per_det;
-    d = uu * per_det;
-}
-
-/// Symmetric 2x2: (a, b; b, d).
-struct Sym2 {
-    float a, b, d;
-};
-
-/// With no eigenvalue above kMostVariance.
-Sym2 capped(const Sym2& C) {
-    if (!(C.a + C.d > kMostVariance)) return C;
-    const Eigen::SelfAdjointEigenSolver<Eigen::Matrix2f> eigen(
-        (Eigen::Matrix2f() << C.a, C.b, C.b, C.d).finished());
-    const Eigen::Matrix2f V = eigen.eigenvectors();
-    const Eigen::Matrix2f out =
-        V * eigen.eigenvalues().cwiseMin(kMostVariance).asDiagonal() * V.transpose();
-    return {out(0, 0), out(0, 1), out(1, 1)};
-}
-
-/// Covariance of the normal, and the largest of what leaving out one point adds to it: with
-/// S less one point (and its share of the centroid) by Sherman-Morrison.
-template <int N>
-void find_uncertainty(const InPlane<N>& f, Patch& patch) {
-    const Sym2 C = capped({f.variance * f.a, f.variance * f.b, f.variance * f.d});
-    const Vector3f p = C.a * f.e1 + C.b * f.e2, q = C.b * f.e1 + C.d * f.e2;
-    const auto entry = [&](int i, int j) { return p[i] * f.e1[j] + q[i] * f.e2[j]; };
-    patch.covariance = {entry(0, 0), entry(0, 1), entry(0, 2),
-                        entry(1, 1), entry(1, 2), entry(2, 2)};
-
-    using Numbers = typename InPlane<N>::Numbers;
-    constexpr float kLess = 1.F - 1.F / N;
-    const Numbers gu = f.a * f.u + f.b * f.v, gv = f.b * f.u + f.d * f.v;
-    const Numbers freedom = (kLess - f.u * gu - f.v * gv).max(kMinFreedom);
-    const Numbers loss = (gu.square() + gv.square()) / freedom;
-    int worst = 0;
-    for (int i = 1; i < N; ++i) {
-        if (loss[i] > loss[worst]) worst = i;
-    }
-    if (!(loss[worst] > 0.F)) return;
-    const float size = std::min(std::sqrt(f.variance / freedom[worst]),
-                                kMostDoubt / std::sqrt(loss[worst] * freedom[worst]));
-    patch.doubt = size * (gu[worst] * f.e1 + gv[worst] * f.e2);
+    return out;
 }
 
 /// Regression of the heights on the half squared distances, from which their own plane is taken.
 /// (The rest of a regression is orthogonal to what was taken out, so the heights need not lose
 /// theirs.)
-template <int N>
-void find_bend(const InPlane<N>& f, Patch& patch) {
-    using Numbers = typename InPlane<N>::Numbers;
-    const Numbers half = 0.5F * (f.u.square() + f.v.square());
-    patch.sag_mean = half.mean();
-    const Numbers off = half - patch.sag_mean;
-    const float ou = (off * f.u).sum(), ov = (off * f.v).sum();
-    const float su = f.a * ou + f.b * ov, sv = f.b * ou + f.d * ov;
-    const Numbers run = off - su * f.u - sv * f.v;
-    patch.bend_rise = (run * f.height).sum();
-    patch.bend_run = run.square().sum();
-    patch.sag_slope = su * f.e1 + sv * f.e2;
-}
-
-int facing_of(const Vector3f& n) {
-    const auto quarter = [](float v) { return v >= 0.5F ? 3 : v >= 0.F ? 2 : v >= -0.5F ? 1 : 0; };
-    return (quarter(n.x()) * 4 + quarter(n.y())) * 4 + quarter(n.z());
-}
-
-template <int N>
-void describe(const float* xyz, int stride, const Vector3f& normal, const Vector3f& towards,
-              Patch& patch) {
-    const InPlane<N> f(xyz, stride, normal, towards);
-    patch.centroid = f.centroid;
-    find_uncertainty(f, patch);
-    find_bend(f, patch);
+inline void find_bend(const HalfSquares& h, const Upper& S, const Upper& inverse,
+                      const Vector3f& normal, Patch& patch) {
+    const Vector3f moment(h.x, h.y, h.z);
+    const Vector3f slope = multiply(inverse, moment);
+    patch.sag_mean = h.sum / Patch::kCount;
+    patch.sag_slope = slope;
+    patch.bend_rise = patch.side.sign * (moment - multiply(S, slope)).dot(normal);
+    patch.bend_run = std::max(h.squares - h.sum * patch.sag_mean - slope.dot(moment), 0.F);
 }
 
 }  // namespace
 
-double Patch::variance_along(const Eigen::Vector3d& d, double a) const {
-    const Vector3f w = d.cast<float>();
-    const auto& [xx, xy, xz, yy, yz, zz] = covariance;
-    const float formal = w.x() * (xx * w.x() + 2.F * (xy * w.y() + xz * w.z())) +
-                         w.y() * (yy * w.y() + 2.F * yz * w.z()) + zz * w.z() * w.z();
-    const float doubted = doubt.dot(w);
-    const float total = xx + yy + zz + doubt.squaredNorm();
-    const auto component = static_cast<float>(a);
-    return static_cast<double>(formal + doubted * doubted +
-                               0.5F * total * total * component * component);
+/// With the inverse scatter less one point (and its share of the centroid) by Sherman-Morrison.
+Vector3f Patch::find_doubt(const Vector3f& normal) const {
+    Upper S{};
+    const auto offset = [this](int i) {
+        return Eigen::Map<const Vector3f>(offsets.data() + 3 * i);
+    };
+    for (int i = 0; i < kCount; ++i) {
+        for (int j = 0, at = 0; j < 3; ++j) {
+            for (int k = j; k < 3; ++k)
+                S[static_cast<std::size_t>(at++)] += offset(i)[j] * offset(i)[k];
+        }
+    }
+    const Upper inverse = in_plane(S, normal).inverse;
+    constexpr float kLess = 1.F - 1.F / kCount;
+    float worst = 0.F, freedom = 1.F;
+    Vector3f change = Vector3f::Zero();
+    for (int i = 0; i < kCount; ++i) {
+        const Vector3f g = multiply(inverse, offset(i));
+        const float free = std::max(kLess - offset(i).dot(g), kMinFreedom);
+        const float loss = g.squaredNorm() / free;
+        if (!(loss > worst)) continue;
+        worst = loss;
+        freedom = free;
+        change = g;
+    }
+    if (!(worst > 0.F)) return change;
+    const float size =
+        std::min(std::sqrt(variance / freedom), kMostDoubt / std::sqrt(worst * freedom));
+    return size * change;
 }
 
-float Patch::sag(const Vector3f& normal, const Vector3f& p) const {
-    const Vector3f d = p - centroid;
-    const float off = normal.dot(d);
-    return 0.5F * (d.squaredNorm() - off * off) - sag_mean - sag_slope.dot(d);
+double Patch::variance_along(const Eigen::Vector3d& d, const Eigen::Vector3d& normal) const {
+    const Vector3f& left_out = doubt(normal.cast<float>());
+    const double doubted = left_out.cast<double>().dot(d);
+    const double total =
+        static_cast<double>(covariance[0] + covariance[3] + covariance[5] + left_out.squaredNorm());
+    const double a = normal.dot(d);
+    return static_cast<double>(formal_variance(d.cast<float>())) + doubted * doubted +
+           0.5 * total * total * a * a;
 }
 
-Patch make_patch(const float* xyz, int stride, int count, const Vector3f& normal,
-                 const Vector3f& sensor) {
-    Patch patch;
-    if (count < 4) {  // three points have no fit to judge: anything in the plane is possible
+SurfaceSide side_of(const Vector3f& normal, const Vector3f& to_sensor) {
+    const float sign = normal.dot(to_sensor) < 0.F ? -1.F : 1.F;
+    return {sign, facing_of(sign * normal)};
+}
+
+void make_patch(const float* xyz, int stride, int count, const PlaneMoments& moments,
+                const Vector3f& normal, const SurfaceSide& side, Patch& patch) {
+    if (count < Patch::kCount) {  // no fit to judge: anything in the plane is possible
+        patch = Patch();
         for (int i = 0, k = 0; i < 3; ++i) {
             for (int j = i; j < 3; ++j, ++k) {
                 const auto at = static_cast<std::size_t>(k);
                 patch.covariance[at] = (i == j ? 1.F : 0.F) - normal[i] * normal[j];
             }
         }
-        return patch;
+        return;
     }
-    const bool away = normal.dot(sensor - Eigen::Map<const Vector3f>(xyz)) < 0.F;
-    const Vector3f towards = away ? Vector3f(-normal) : normal;
-    patch.side = away ? -1.F : 1.F;
-    patch.facing = facing_of(towards);
-    if (count == 4) {
-        describe<4>(xyz, stride, normal, towards, patch);
-    } else {
-        describe<5>(xyz, stride, normal, towards, patch);
-    }
-    return patch;
+    patch.forget_doubt();
+    patch.side = side;
+    patch.centroid = moments.centroid;
+    const HalfSquares halves = copy_offsets(xyz, stride, normal, patch);
+    const InPlane plane = in_plane(moments.scatter, normal);
+    constexpr float kN = Patch::kCount, kFreedom = kN - 3.F;
+    const float bend = 0.5F * kUnknownBend * (plane.trace + 2.F * kMinScatter) / kN;
+    patch.variance = std::max(kPointSigma * kPointSigma, plane.height / kFreedom) + bend * bend;
+    for (std::size_t i = 0; i < 6; ++i) patch.covariance[i] = patch.variance * plane.inverse[i];
+    const auto& C = patch.covariance;
+    if (C[0] + C[3] + C[5] > kMostVariance) patch.covariance = capped(C);
+    find_bend(halves, moments.scatter, plane.inverse, normal, patch);
 }
 
 }  // namespace d2lio

@@ -51,4 +51,17 @@ PriorTerm RemapPrior::evaluate(const Spectrum& s, const Mat3& /*P_r*/, const Mat
     return out;
 }
 
+PriorTerm TruncatedPrior::evaluate(const Spectrum& s, const Mat3& /*P_r*/,
+                                   const Mat3& /*P_t*/) const {
+    const auto least = [this](const BlockSpectrum& b) {  // eigenvalues are squared singular values
+        return b.lambda[2] / (condition * condition);
+    };
+    PriorTerm out;
+    out.keep_r = well_conditioned_projector(s.rotation, least(s.rotation));
+    out.keep_t = well_conditioned_projector(s.translation, least(s.translation));
+    out.projects =
+        s.rotation.lambda[0] < least(s.rotation) || s.translation.lambda[0] < least(s.translation);
+    return out;
+}
+
 }  // namespace d2lio

@@ -3,18 +3,24 @@
 #include "d2lio/degeneracy/prior.hpp"
 
 #include <cmath>
+#include <type_traits>
 
 #include "d2lio/geometry/so3.hpp"
 
 namespace d2lio {
 namespace {
 
-std::variant<NoPrior, PaperPrior, RemapPrior> make_policy(const DegeneracyConfig& c) {
+std::variant<NoPrior, PaperPrior, RemapPrior, TruncatedPrior, XIcpPrior> make_policy(
+    const DegeneracyConfig& c) {
     switch (c.method) {
         case DegeneracyMethod::kPaper:
             return PaperPrior{c.form, c.w, c.lambda_min};
         case DegeneracyMethod::kRemap:
             return RemapPrior{c.threshold_r, c.threshold_t};
+        case DegeneracyMethod::kTruncatedSvd:
+            return TruncatedPrior{c.condition};
+        case DegeneracyMethod::kXIcp:
+            return XIcpPrior{c.kappa_2, c.kappa_3};
         case DegeneracyMethod::kNoiseAware:  // acts on the rows, not by a prior
         case DegeneracyMethod::kNone:
             break;
@@ -25,7 +31,8 @@ std::variant<NoPrior, PaperPrior, RemapPrior> make_policy(const DegeneracyConfig
 }  // namespace
 
 void DegeneracyConfig::bind(ParamTable& table) {
-    table.add("degeneracy.method", method, {"none", "paper", "remap", "noise_aware"},
+    table.add("degeneracy.method", method,
+              {"none", "paper", "remap", "tsvd", "xicp", "noise_aware"},
               "what is done where the scan cannot see");
     table.add("degeneracy.form", form, {"congruence", "paper"},
               "weight of method paper: symmetric congruence or the literal product");
@@ -38,6 +45,14 @@ void DegeneracyConfig::bind(ParamTable& table) {
               "rotation eigenvalue below which method remap keeps the prediction");
     table.add("degeneracy.threshold_t", threshold_t, {0.0, 1e9}, "points",
               "translation eigenvalue below which method remap keeps the prediction");
+    table.add("degeneracy.condition", condition, {1.0, 1e9}, "",
+              "ratio of a block's singular values above which method tsvd keeps the prediction");
+    table.add("degeneracy.kappa_2", kappa_2, {0.0, 1e9}, "points",
+              "contributions to a direction above cos 80 deg below which method xicp keeps the "
+              "prediction, unless kappa_3 is reached");
+    table.add("degeneracy.kappa_3", kappa_3, {0.0, 1e9}, "points",
+              "contributions above cos 45 deg below which method xicp keeps the prediction, unless "
+              "kappa_2 is reached");
     table.add(
         "degeneracy.share_low", noise_aware.share_low, {0.0, 1e3}, "",
         "share of a direction's information that may be noise before method noise_aware acts");
@@ -63,9 +78,17 @@ void DegeneracyConfig::validate() const {
 
 DirectionalPrior::DirectionalPrior(const DegeneracyConfig& config) : policy_(make_policy(config)) {}
 
-PriorTerm DirectionalPrior::evaluate(const Spectrum& spectrum, const Mat3& P_r,
-                                     const Mat3& P_t) const {
-    return std::visit([&](const auto& p) { return p.evaluate(spectrum, P_r, P_t); }, policy_);
+PriorTerm DirectionalPrior::evaluate(const Spectrum& spectrum, const Mat3& P_r, const Mat3& P_t,
+                                     const RowView* rows) const {
+    return std::visit(
+        [&](const auto& p) -> PriorTerm {
+            if constexpr (std::is_same_v<std::decay_t<decltype(p)>, XIcpPrior>) {
+                return rows != nullptr ? p.evaluate(spectrum, *rows) : PriorTerm{};
+            } else {
+                return p.evaluate(spectrum, P_r, P_t);
+            }
+        },
+        policy_);
 }
 
 PriorRows make_prior_rows(const PriorTerm& prior, const Vec3& e_r, const Vec3& e_t,

@@ -27,10 +27,16 @@ Matrix3d symmetric_adjugate(const Matrix3d& s) {
     return a;
 }
 
+PlaneMoments moments_of(const Vector3d& c, const Matrix3d& S) {
+    const auto entry = [&S](int i, int j) { return static_cast<float>(S(i, j)); };
+    return {c.cast<float>(),
+            {entry(0, 0), entry(0, 1), entry(0, 2), entry(1, 1), entry(1, 2), entry(2, 2)}};
+}
+
 }  // namespace
 
 PlaneStatus fit_plane(const float* xyz, int stride, int count, const PlaneFitOptions& options,
-                      Plane& plane) {
+                      Plane& plane, PlaneMoments* moments) {
     if (count < 3) return PlaneStatus::kSingular;
     const double n = count;
     Vector3d c = Vector3d::Zero();
@@ -41,6 +47,7 @@ PlaneStatus fit_plane(const float* xyz, int stride, int count, const PlaneFitOpt
         const Vector3d d = point(xyz, stride, i) - c;
         scatter.noalias() += d * d.transpose();
     }
+    if (moments != nullptr) *moments = moments_of(c, scatter);
     const Matrix3d adj = symmetric_adjugate(scatter);
     const double trace = scatter.trace();
     // trace(adj) is the sum of the products of eigenvalue pairs, close to largest x middle.

@@ -36,10 +36,10 @@ Status Plugin::Core::begin(bool usable, const Pose& previous) {
     return Status::kOk;
 }
 
-PriorTerm Plugin::Core::analyse(const Mat3& AtA_r, const Mat3& AtA_t) {
+PriorTerm Plugin::Core::analyse(const Mat3& AtA_r, const Mat3& AtA_t, const RowView* rows) {
     ++current.iterations;
     const Spectrum spectrum{decompose(AtA_r), decompose(AtA_t)};
-    const PriorTerm term = prior.evaluate(spectrum, P_r, P_t);
+    const PriorTerm term = prior.evaluate(spectrum, P_r, P_t, rows);
     keep_spectrum(spectrum, term);
     return term;
 }
@@ -53,6 +53,11 @@ BlindDirections Plugin::Core::find_blind(const SurfaceSums& sums) {
     blind_now = blind;
     current.blind = blind.count;
     return blind;
+}
+
+void Plugin::Core::forget_blind() {
+    blind_now = BlindDirections{};
+    current.blind = 0;
 }
 
 void Plugin::Core::keep_spectrum(const Spectrum& s, const PriorTerm& term) {
@@ -151,6 +156,7 @@ bool Plugin::set_map_voxel(double size) {
 
 bool Plugin::rejects() const { return core_->rejector.active(); }
 bool Plugin::has_prior() const { return core_->prior.active(); }
+bool Plugin::counts_rows() const { return core_->degeneracy.counts_rows(); }
 bool Plugin::reads_surfaces() const { return core_->degeneracy.cleans_rows(); }
 bool Plugin::starts_at_rest() const { return reads_surfaces() && core_->degeneracy.rest; }
 

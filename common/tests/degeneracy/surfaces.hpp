@@ -25,16 +25,24 @@ struct Points {
     Vec3 at(int i) const {
         return Eigen::Map<const Eigen::Vector3f>(xyz.data() + 3 * i).cast<double>();
     }
-    Plane plane() const {
+    Plane plane(PlaneMoments* moments = nullptr) const {
         Plane out;
         PlaneFitOptions options;
         options.max_distance = 10.F;
         options.min_spread_ratio = 0.0;
-        fit_plane(xyz.data(), 3, 5, options, out);
+        fit_plane(xyz.data(), 3, 5, options, out, moments);
+        return out;
+    }
+    PlaneMoments moments() const {
+        PlaneMoments out;
+        plane(&out);
         return out;
     }
     Patch patch(const Eigen::Vector3f& normal, const Vec3& sensor = Vec3::Zero()) const {
-        return make_patch(xyz.data(), 3, 5, normal, sensor.cast<float>());
+        Patch out;
+        const SurfaceSide side = side_of(normal, (sensor - at(0)).cast<float>());
+        make_patch(xyz.data(), 3, 5, moments(), normal, side, out);
+        return out;
     }
     Patch patch() const { return patch(plane().normal); }
 };

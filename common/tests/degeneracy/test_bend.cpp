@@ -31,7 +31,7 @@ int look(BendField& field, test::Random& random, const Surface& wall, int patche
     for (int i = 0; i < patches; ++i) {
         const auto points = wall.sample(test::random_places(random, 0.4), random, test::kMapNoise);
         const Patch patch = points.patch(wall.normal().cast<float>());
-        facing = patch.facing;
+        facing = patch.side.facing;
         field.add(patch);
     }
     field.end_scan();
@@ -83,14 +83,14 @@ TEST(BendField, WhatIsBarelySignificantIsShrunk) {
     patch.bend_rise = 3.F * 0.02F / 0.1F * patch.bend_run;
     BendField field;
     field.add(patch);
-    EXPECT_EQ(field.at(patch.facing), 0.F);  // not before the scan ends
+    EXPECT_EQ(field.at(patch.side.facing), 0.F);  // not before the scan ends
     field.end_scan();
-    EXPECT_NEAR(field.at(patch.facing), 0.6F * (1.F - 4.F / 9.F), 1e-5F);
+    EXPECT_NEAR(field.at(patch.side.facing), 0.6F * (1.F - 4.F / 9.F), 1e-5F);
     patch.bend_rise /= 1.51F;  // just under two sigma
     BendField weak;
     weak.add(patch);
     weak.end_scan();
-    EXPECT_EQ(weak.at(patch.facing), 0.F);
+    EXPECT_EQ(weak.at(patch.side.facing), 0.F);
 }
 
 TEST(BendField, FadesWithATimeConstantOfTenScans) {
@@ -103,7 +103,7 @@ TEST(BendField, FadesWithATimeConstantOfTenScans) {
             field.add(patch);
             field.end_scan();
         }
-        return static_cast<double>(field.at(patch.facing));
+        return static_cast<double>(field.at(patch.side.facing));
     };
     const double before = look(bent, 80);
     EXPECT_NEAR(before, 0.2, 1e-3);
@@ -153,9 +153,9 @@ TEST(BendField, TheSpreadOfMeansPutsTheSurfaceBackWhereItWas) {
         }
         const Plane plane = means.plane();
         const Patch patch = means.patch(plane.normal);
-        if (patch.facing != facing) continue;
+        if (patch.side.facing != facing) continue;
         const Eigen::Vector3f p = vault.at(Eigen::Vector2d::Zero()).cast<float>();
-        const double side = static_cast<double>(patch.side);
+        const double side = static_cast<double>(patch.side.sign);
         const auto off = [&](double spread) {
             const float sag = field.sag(patch, plane.normal, p, static_cast<float>(spread));
             return side * static_cast<double>(plane.signed_distance(p) - sag);
@@ -176,7 +176,7 @@ TEST(BendField, APatchThatIsNotANumberBendsNothing) {
     BendField field;
     field.add(bad);
     field.end_scan();
-    EXPECT_EQ(field.at(bad.facing), 0.F);
+    EXPECT_EQ(field.at(bad.side.facing), 0.F);
 }
 
 }  // namespace

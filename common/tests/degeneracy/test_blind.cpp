@@ -51,22 +51,21 @@ BlindDirections blind_x(double blend = 1.0) {
 /// A row that is alone in its scan, or one beside others.
 CleanedRow cleaned(const Vec3& n, const Patch& patch, const BlindDirections& blind,
                    const NoiseAwareConfig& config, const ProvenSum& sum = {}) {
-    return cleaned_row(n, proven_share(n, patch, blind, config), blind, sum);
+    return cleaned_row(n, proven_share(n, patch, blind, config), blind, sum, 1.0);
 }
 
 /// Unit normal with component a along x.
 Vec3 leaning(double a) { return {a, 0.0, std::sqrt(1.0 - a * a)}; }
 
-TEST(SurfaceSums, AddUpNormalsAndTheirCovariancesWithoutTheDoubt) {
+TEST(SurfaceSums, AddUpNormalsAndTheirCovariances) {
     Patch p = uncertain(0.1F);
     p.covariance = {0.01F, 0.F, 0.F, 0.F, 0.F, 0.04F};
-    p.doubt = {1.F, 1.F, 1.F};
     SurfaceSums sums;
     sums.add(Vec3::UnitZ(), p);
     sums.add(Vec3(0.6, 0.8, 0.0), p);
     const Mat3 noise = 2.0 * Vec3(0.01, 0.0, 0.04).asDiagonal().toDenseMatrix();
     EXPECT_LT((sums.noise() - noise).norm(), 1e-7);  // of single precision
-    EXPECT_NEAR(sums.information()(0, 1), 0.48, kExact);
+    EXPECT_NEAR(sums.information()(0, 1), 0.48, 1e-7);
     EXPECT_NEAR(sums.information()(2, 2), 1.0, kExact);
 }
 
@@ -183,9 +182,52 @@ TEST(CleanedRow, SixSigmasAreTheMiddleOfTheFade) {
 }
 
 TEST(CleanedRow, DoubtCountsAsNoise) {
-    Patch doubted = uncertain(0.02F);
-    doubted.doubt = {1.F, 0.F, 0.F};
-    EXPECT_NEAR(cleaned(leaning(0.9), doubted, blind_x(), kConfig).normal.x(), 0.0, kExact);
+    const Vec3 n = leaning(0.9), across = n.cross(Vec3::UnitY());
+    Patch patch = uncertain(0.02F);
+    patch.variance = 4e-4F;
+    EXPECT_EQ(cleaned(n, patch, blind_x(), kConfig).normal, n);
+    patch.forget_doubt();
+    for (int i = 0; i < 5; ++i) {  // four points of a scan line and one beside it
+        const Vec3 place =
+            i < 4 ? Vec3(0.2 * (i - 1.5) * Vec3::UnitY() - 0.1 * across) : Vec3(0.4 * across);
+        Eigen::Map<Eigen::Vector3f>(patch.offsets.data() + 3 * i) = place.cast<float>();
+    }
+    EXPECT_NEAR(cleaned(n, patch, blind_x(), kConfig).normal.x(), 0.0, kExact);
+}
+
+TEST(Trust, HalvesAtThreeSigmasOfRowPatchPredictionAndMapTogether) {
+    Patch patch;
+    patch.variance = 4e-4F;
+    BlindDirections blind = blind_x();
+    blind.variance[0] = 25e-4;
+    const Vec3 n = leaning(0.6);
+    const double S = 1e-3 + 4e-4 + 0.36 * (25e-4 + 9e-4);
+    EXPECT_NEAR(trust(3.0 * std::sqrt(S), n, patch, blind, 1e-3), 0.5, 1e-6);
+    EXPECT_NEAR(trust(-3.0 * std::sqrt(S), n, patch, blind, 1e-3), 0.5, 1e-6);
+    EXPECT_EQ(trust(0.0, n, patch, blind, 1e-3), 1.0);
+    EXPECT_LT(trust(0.5, n, patch, blind, 1e-3), 0.1);
+    patch.variance = std::numeric_limits<float>::quiet_NaN();
+    EXPECT_EQ(trust(0.1, n, patch, blind, 1e-3), 0.0);
+}
+
+TEST(CleanedRow, ASurprisingRowCountsLessAsFarAsItSpeaksOfTheBlindDirection) {
+    const auto weight = [](double a, double trusted) {
+        const Vec3 n = leaning(a);
+        const Vec3 share = proven_share(n, uncertain(1e-3F), blind_x(), kConfig);
+        ProvenSum many;
+        many.information[0] = 1e6;
+        return cleaned_row(n, share, blind_x(), many, trusted).weight;
+    };
+    EXPECT_NEAR(weight(0.9, 0.3), 0.3, 0.01);
+    EXPECT_NEAR(weight(0.05, 0.3), 0.65, 0.01);
+    EXPECT_GT(weight(0.01, 0.3), 0.95);
+    EXPECT_NEAR(weight(0.9, 1.0), 1.0, 1e-4);
+}
+
+TEST(FindBlind, KnowsHowFarThePredictionMayBeOffAlongEachAxis) {
+    const auto b = find_blind(blind_along(Vec3::UnitX()), long_along_x(10.0), kConfig);
+    ASSERT_EQ(b.count, 1);
+    EXPECT_NEAR(b.variance[0], 1e-3, 1e-9);
 }
 
 TEST(CleanedRow, EachBlindDirectionIsJudgedByItself) {

@@ -112,8 +112,9 @@ TEST(Patch, DoubtIsTheWorstOfLeavingOneNeighbourOut) {
             worst = std::max(worst, (scatter(places, i).inverse() - all).trace());
         }
         const double expected = height_variance(scatter(places).trace() / 5.0) * worst;
-        const Patch patch = plane.sample(places, random, 0.0).patch(plane.normal().cast<float>());
-        EXPECT_NEAR(patch.doubt.squaredNorm(), std::min(expected, 1.0),
+        const Eigen::Vector3f n = plane.normal().cast<float>();
+        const Patch patch = plane.sample(places, random, 0.0).patch(n);
+        EXPECT_NEAR(patch.doubt(n).squaredNorm(), std::min(expected, 1.0),
                     0.02 * std::min(expected, 1.0));
     }
 }
@@ -126,23 +127,38 @@ TEST(Patch, FourPointsOfAScanLineAndOneBesideItAreDoubted) {
                       Eigen::Vector2d(0.0, 0.4)};
     const Eigen::Vector3f n = plane.normal().cast<float>();
     const Patch thin = plane.sample(line, random, 0.0).patch(n);
-    EXPECT_GT(std::abs(thin.doubt.cast<double>().dot(plane.v)), 0.9);
-    EXPECT_LT(std::abs(thin.doubt.cast<double>().dot(plane.u)), 0.1);
-    EXPECT_GT(thin.variance_along(plane.v, 0.0), 0.8);
+    EXPECT_GT(std::abs(thin.doubt(n).cast<double>().dot(plane.v)), 0.9);
+    EXPECT_LT(std::abs(thin.doubt(n).cast<double>().dot(plane.u)), 0.1);
+    EXPECT_GT(thin.variance_along(plane.v, plane.normal()), 0.8);
     const Patch wide = plane.sample(test::square(0.3), random, 0.0).patch(n);
-    EXPECT_LT(wide.doubt.norm(), 0.2F);
+    EXPECT_LT(wide.doubt(n).norm(), 0.2F);
 }
 
-TEST(Patch, VarianceAlongADirectionAddsUpAndANormalLostByHalfARadianSaysNothing) {
+TEST(Patch, VarianceAlongADirectionAddsUp) {
+    test::Random random(12);
+    const Surface plane = test::random_plane(random);
+    const Vec3 n = plane.normal();
+    const Patch p = plane.sample(kOblong, random, 0.0).patch(n.cast<float>());
+    const Vec3 doubt = p.doubt(n.cast<float>()).cast<double>();
+    const Mat3 C = covariance(p);
+    for (int round = 0; round < 10; ++round) {
+        const Vec3 d = random.rotation().col(0);
+        EXPECT_NEAR(p.formal_variance(d.cast<float>()), d.dot(C * d), 1e-6);
+        const double total = C.trace() + doubt.squaredNorm();
+        const double second_order = 0.5 * std::pow(total * n.dot(d), 2);
+        const double expected = d.dot(C * d) + std::pow(doubt.dot(d), 2) + second_order;
+        EXPECT_NEAR(p.variance_along(d, n), expected, 1e-6);
+    }
+    EXPECT_GT(doubt.norm(), 0.02);
+}
+
+TEST(Patch, ANormalLostByHalfARadianSaysNothing) {
     Patch p;
     p.covariance = {0.F, 0.F, 0.F, 9e-4F, 0.F, 16e-4F};
-    p.doubt = {0.F, 0.05F, 0.F};
-    EXPECT_NEAR(p.variance_along(Vec3::UnitY(), 0.0), 0.03 * 0.03 + 0.05 * 0.05, 1e-9);
-    EXPECT_NEAR(p.variance_along(Vec3::UnitZ(), 0.0), 0.04 * 0.04, 1e-9);
-    EXPECT_GT(1.0 / std::sqrt(p.variance_along(Vec3::UnitX(), 1.0)), 100.0);  // sigmas
+    EXPECT_GT(1.0 / std::sqrt(p.variance_along(Vec3::UnitX(), Vec3::UnitX())), 100.0);  // sigmas
     Patch lost;
     lost.covariance[3] = 0.25F;
-    EXPECT_LT(1.0 / std::sqrt(lost.variance_along(Vec3::UnitX(), 1.0)), 6.0);
+    EXPECT_LT(1.0 / std::sqrt(lost.variance_along(Vec3::UnitX(), Vec3::UnitX())), 6.0);
 }
 
 /// bend_u = bend_v is a sphere, bend_v = 0 a cylinder.
@@ -166,9 +182,9 @@ TEST(Patch, FindsTheMeanCurvatureOfSpheresAndCylinders) {
                 const Patch in = points.patch(fitted, above), out = points.patch(fitted, below);
                 EXPECT_NEAR(in.bend_rise / in.bend_run, bent.mean(), kSmallAngles * 0.2);
                 EXPECT_NEAR(out.bend_rise / out.bend_run, -bent.mean(), kSmallAngles * 0.2);
-                EXPECT_EQ(in.side, sign > 0.0 ? 1.F : -1.F);
-                EXPECT_EQ(out.side, -in.side);
-                EXPECT_NE(in.facing, out.facing);
+                EXPECT_EQ(in.side.sign, sign > 0.0 ? 1.F : -1.F);
+                EXPECT_EQ(out.side.sign, -in.side.sign);
+                EXPECT_NE(in.side.facing, out.side.facing);
             }
         }
     }
@@ -187,7 +203,8 @@ TEST(Patch, SagIsTheDistanceOfABentSurfaceFromItsPlane) {
         for (int i = 0; i < 5; ++i) {
             const Eigen::Vector3f p = sphere.at(test::random_places(random, 0.3)[0]).cast<float>();
             const double plain = static_cast<double>(plane.signed_distance(p));
-            const double sag = 0.2 * static_cast<double>(patch.side * patch.sag(plane.normal, p));
+            const double sag =
+                0.2 * static_cast<double>(patch.side.sign * patch.sag(plane.normal, p));
             largest = std::max(largest, std::abs(plain));
             EXPECT_NEAR(sag, plain, 1e-3 + 0.1 * std::abs(plain));  // of a parabola
         }
@@ -211,24 +228,25 @@ TEST(Patch, FacingBinsTellDirectionsApartAndStayInRange) {
     for (int i = 0; i < 2000; ++i) {
         const Surface plane = test::random_plane(random);
         const Points points = plane.sample(test::square(0.3), random, 0.0);
-        const int facing = points.patch(plane.normal().cast<float>()).facing;
+        const int facing = points.patch(plane.normal().cast<float>()).side.facing;
         ASSERT_GE(facing, 0);
         ASSERT_LT(facing, kFacings);
-        EXPECT_EQ(points.patch(-plane.normal().cast<float>()).facing, facing);
+        EXPECT_EQ(points.patch(-plane.normal().cast<float>()).side.facing, facing);
         seen.insert(facing);
     }
     EXPECT_GT(seen.size(), 30U);
 }
 
-void expect_harmless(const Patch& p) {
+void expect_harmless(const Patch& p, const Eigen::Vector3f& normal) {
     const Mat3 C = covariance(p);
-    EXPECT_TRUE(C.allFinite() && p.doubt.allFinite());
+    const Eigen::Vector3f doubt = p.doubt(normal);
+    EXPECT_TRUE(C.allFinite() && doubt.allFinite());
     EXPECT_LE(C.trace(), 2.0 * kCap * kCap);
-    EXPECT_LE(p.doubt.norm(), kCap);
+    EXPECT_LE(doubt.norm(), kCap);
     EXPECT_TRUE(p.centroid.allFinite() && p.sag_slope.allFinite());
     EXPECT_TRUE(std::isfinite(p.bend_rise) && std::isfinite(p.bend_run));
     EXPECT_TRUE(std::isfinite(p.sag({0.F, 0.F, 1.F}, {1.F, 2.F, 3.F})));
-    EXPECT_GE(p.variance_along(Vec3::UnitX(), 0.5), 0.0);
+    EXPECT_GE(p.variance_along(Vec3::UnitX(), normal.cast<double>()), 0.0);
 }
 
 TEST(Patch, CoincidentCollinearAndTooFewPointsStayFinite) {
@@ -238,15 +256,17 @@ TEST(Patch, CoincidentCollinearAndTooFewPointsStayFinite) {
         same.set(i, Vec3(1.0, 2.0, 3.0));
         line.set(i, Vec3(1.0 + 0.1 * i, 2.0, 3.0));
     }
-    expect_harmless(same.patch(n));
+    expect_harmless(same.patch(n), n);
     const Patch thin = line.patch(n);
-    expect_harmless(thin);
-    EXPECT_GT(thin.variance_along(Vec3::UnitY(), 0.0), 0.9);  // nothing is known across the line
-    for (int count = 0; count < 4; ++count) {
-        const Patch few = make_patch(line.xyz.data(), 3, count, n, Eigen::Vector3f::Zero());
-        expect_harmless(few);
-        EXPECT_GE(few.variance_along(Vec3::UnitX(), 0.0), 0.99);
-        EXPECT_GE(few.variance_along(Vec3::UnitY(), 0.0), 0.99);
+    expect_harmless(thin, n);
+    EXPECT_GT(thin.variance_along(Vec3::UnitY(), Vec3::UnitZ()),
+              0.9);  // nothing is known across the line
+    for (int count = 0; count < 5; ++count) {
+        Patch few = thin;
+        make_patch(line.xyz.data(), 3, count, {}, n, {}, few);
+        expect_harmless(few, n);
+        EXPECT_GE(few.variance_along(Vec3::UnitX(), Vec3::UnitZ()), 0.99);
+        EXPECT_GE(few.variance_along(Vec3::UnitY(), Vec3::UnitZ()), 0.99);
     }
 }
 
@@ -255,8 +275,8 @@ TEST(Patch, HugeAndTinyPatchesStayFinite) {
     for (const double half : {1e-4, 1e-2, 10.0, 1e3}) {
         Surface plane = test::random_plane(random);
         plane.origin *= 100.0;
-        expect_harmless(plane.sample(test::random_places(random, half), random, 0.0)
-                            .patch(plane.normal().cast<float>()));
+        const Eigen::Vector3f n = plane.normal().cast<float>();
+        expect_harmless(plane.sample(test::random_places(random, half), random, 0.0).patch(n), n);
     }
 }
 
@@ -266,8 +286,9 @@ TEST(Patch, ANotANumberNeverLooksCertain) {
     Points points = plane.sample(test::square(0.3), random, 0.0);
     points.xyz[4] = kNotANumber;
     const Patch p = points.patch(plane.normal().cast<float>());
-    const double a = 0.5;
-    EXPECT_FALSE(a * a > p.variance_along(Vec3::UnitX(), a));
+    const Vec3 n(0.5, std::sqrt(0.75), 0.0);
+    EXPECT_FALSE(0.25 > p.variance_along(Vec3::UnitX(), n));
+    EXPECT_FALSE(0.25F > p.formal_variance(Eigen::Vector3f::UnitX()));
 }
 
 TEST(Patch, TheStrideSkipsWhatIsBetween) {
@@ -279,9 +300,10 @@ TEST(Patch, TheStrideSkipsWhatIsBetween) {
     for (std::size_t i = 0; i < 15; ++i) spread[8 * (i / 3) + i % 3] = points.xyz[i];
     const Eigen::Vector3f n = points.plane().normal;
     const Patch a = points.patch(n);
-    const Patch b = make_patch(spread.data(), 8, 5, n, Eigen::Vector3f::Zero());
+    Patch b;
+    make_patch(spread.data(), 8, 5, points.moments(), n, a.side, b);
     EXPECT_EQ(a.covariance, b.covariance);
-    EXPECT_EQ(a.doubt, b.doubt);
+    EXPECT_EQ(a.doubt(n), b.doubt(n));
     EXPECT_EQ(a.bend_rise, b.bend_rise);
     EXPECT_EQ(a.sag_slope, b.sag_slope);
 }

@@ -5,6 +5,7 @@
 #include <Eigen/Cholesky>
 #include <Eigen/Geometry>
 
+#include "d2lio/degeneracy/clean_rows.hpp"
 #include "d2lio/geometry/so3.hpp"
 #include "d2lio/plugin/core.hpp"
 #include "gate.hpp"
@@ -18,6 +19,10 @@ using StridedRows = Eigen::Map<Eigen::Matrix<double, Eigen::Dynamic, 3>, 0,
 StridedRows block(const Rows& rows, int column) {
     return {rows.jacobian + column * rows.column_step, rows.count, 3,
             Eigen::Stride<Eigen::Dynamic, Eigen::Dynamic>(rows.column_step, rows.row_step)};
+}
+
+RowView::Block view_of(const Rows& rows, int column) {
+    return {rows.jacobian + column * rows.column_step, rows.count, rows.row_step, rows.column_step};
 }
 
 Mat3 gram(const StridedRows& A) {
@@ -44,12 +49,14 @@ struct Adapter::Impl {
     bool rested = false;                ///< one of them
     bool at_rest = false;               ///< this one
     std::vector<std::size_t> accepted;  ///< the points behind the rows, in order
-    std::vector<Vec3> proven;           ///< shares of the rows
+    RowCleaner cleaner;
+    Gate::Look look = Gate::Look::kAll;
 
     bool read(const ScanInput& input, Core& core);
     void copy_rows(const PriorRows& rows);
     bool settled() const { return rested || scans > kSettlingScans; }
-    void clean(const Rows& rows, const Pose& x, Core& core);
+    void clean(const Rows& rows, const Pose& x, double row_variance, Core& core);
+    void choose_look(const Core& core);
     Status remove_prior(double* covariance, int size) const;
 };
 
@@ -102,8 +109,10 @@ Status Adapter::begin_scan(const ScanInput& input) {
     impl_->at_rest = input.at_rest;
     impl_->rested = impl_->rested || input.at_rest;
     const bool usable = impl_->read(input, core());
-    impl_->gate.begin_scan(input.points, core().predicted.t, core().degeneracy.cleans_rows());
-    return core().begin(usable, to_pose(input.previous));
+    const Status status = core().begin(usable, to_pose(input.previous));
+    if (!core().degeneracy.cleans_rows()) impl_->look = Gate::Look::kNot;
+    impl_->gate.begin_scan(input.points, core().predicted.t, impl_->look);
+    return status;
 }
 
 Verdict Adapter::accept(const Candidate& candidate, Correspondence* out) {
@@ -121,48 +130,83 @@ void Adapter::Impl::copy_rows(const PriorRows& p) {
     rows.count = p.count;
 }
 
+/// Where the last scan saw every direction well, a sample of the next one's surfaces will tell.
+void Adapter::Impl::choose_look(const Core& core) {
+    const double well = 0.5 * core.degeneracy.noise_aware.share_low;
+    const bool seeing = core.current.noise_share[0] < well;
+    look = seeing ? Gate::Look::kSample : Gate::Look::kAll;
+}
+
+/// The host's rows as RowCleaner sees them.
+class HostRows {
+  public:
+    HostRows(const Rows& rows, double variance, const Pose& x, const Gate& gate,
+             const std::vector<std::size_t>& accepted)
+        : rows_(rows),
+          variance_(variance),
+          R_inverse_(x.R.transpose()),
+          t_(x.t),
+          gate_(gate),
+          accepted_(accepted) {}
+
+    std::size_t size() const { return accepted_.size(); }
+    Vec3 normal(std::size_t k) const {
+        const double* const n = entry(k, rows_.position_column);
+        return {n[0], n[rows_.column_step], n[2 * rows_.column_step]};
+    }
+    const Patch* patch(std::size_t k) const { return gate_.patch(accepted_[k]); }
+    double trusted(std::size_t k, const Vec3& normal, const BlindDirections& blind) const {
+        return trust(rows_.residual[k], normal, *patch(k), blind, variance_);
+    }
+
+    void replace(std::size_t k, const Vec3& normal, const CleanedRow& cleaned) {
+        const Vec3 arm = gate_.point(accepted_[k]).cast<double>() - t_;
+        const Vec3 kept = cleaned.weight * cleaned.normal;
+        put(k, rows_.position_column, kept);
+        put(k, rows_.rotation_column, R_inverse_ * arm.cross(kept));
+        rows_.residual[k] *= cleaned.weight;
+        if (rows_.extrinsic_column < 0) return;
+        // A row that lost something tells nothing of the extrinsic.
+        const double share = cleaned.normal == normal ? cleaned.weight : 0.0;
+        double* const extrinsic = entry(k, rows_.extrinsic_column);
+        for (int c = 0; c < 6; ++c) extrinsic[c * rows_.column_step] *= share;
+    }
+
+  private:
+    double* entry(std::size_t k, int column) const {
+        return rows_.jacobian + static_cast<std::ptrdiff_t>(k) * rows_.row_step +
+               column * rows_.column_step;
+    }
+    void put(std::size_t k, int column, const Vec3& v) {
+        double* const to = entry(k, column);
+        to[0] = v[0];
+        to[rows_.column_step] = v[1];
+        to[2 * rows_.column_step] = v[2];
+    }
+
+    const Rows rows_;
+    const double variance_;
+    const Mat3 R_inverse_;
+    const Vec3 t_;
+    const Gate& gate_;
+    const std::vector<std::size_t>& accepted_;
+};
+
 /// Takes what noise has put into the rows along blind directions out of them (method noise_aware).
-void Adapter::Impl::clean(const Rows& rows, const Pose& x, Core& core) {
+void Adapter::Impl::clean(const Rows& rows, const Pose& x, double row_variance, Core& core) {
     accepted.clear();
     for (std::size_t i = 0; i < gate.book().size(); ++i) {
         if (gate.book().verdict(i) == Verdict::kAccepted) accepted.push_back(i);
     }
     if (static_cast<int>(accepted.size()) != rows.count) return;  // not the rows offered here
-    StridedRows A_t = block(rows, rows.position_column);
-    StridedRows A_r = block(rows, rows.rotation_column);
-    SurfaceSums sums;
-    for (std::size_t k = 0; k < accepted.size(); ++k) {
-        sums.add(A_t.row(static_cast<Eigen::Index>(k)), gate.patch(accepted[k]));
+    HostRows host(rows, row_variance, x, gate, accepted);
+    const BlindDirections blind = core.find_blind(cleaner.sums(host));
+    if (look == Gate::Look::kSample && blind.count > 0) {  // by too few patches to act on it
+        core.forget_blind();
+        return;
     }
-    const NoiseAwareConfig& config = core.degeneracy.noise_aware;
-    const BlindDirections blind = core.find_blind(sums);
     if (blind.count == 0 || at_rest || !settled()) return;
-    proven.resize(accepted.size());
-    ProvenSum sum;
-    for (std::size_t k = 0; k < accepted.size(); ++k) {
-        const Vec3 n = A_t.row(static_cast<Eigen::Index>(k));
-        proven[k] = proven_share(n, gate.patch(accepted[k]), blind, config);
-        sum.add(n, proven[k], blind);
-    }
-    for (std::size_t k = 0; k < accepted.size(); ++k) {
-        const std::size_t i = accepted[k];
-        const auto row = static_cast<Eigen::Index>(k);
-        const Vec3 n = A_t.row(row);
-        const CleanedRow cleaned = cleaned_row(n, proven[k], blind, sum);
-        if (cleaned.normal == n && cleaned.weight == 1.0) continue;
-        const Vec3 arm = gate.point(i).cast<double>() - x.t;
-        const Vec3 kept = cleaned.weight * cleaned.normal;
-        A_t.row(row) = kept;
-        A_r.row(row) = x.R.transpose() * arm.cross(kept);
-        rows.residual[k] *= cleaned.weight;
-        const bool lost = cleaned.normal != n;
-        if (rows.extrinsic_column >= 0) {  // a row that lost something tells nothing of it
-            const double share = lost ? 0.0 : cleaned.weight;
-            block(rows, rows.extrinsic_column).row(row) *= share;
-            block(rows, rows.extrinsic_column + 3).row(row) *= share;
-        }
-        core.current.cleaned += lost ? 1 : 0;
-    }
+    core.current.cleaned = cleaner.clean(blind, core.degeneracy.noise_aware, host);
 }
 
 Status Adapter::condition(const Rows& rows, const PoseView& pose, double variance,
@@ -175,8 +219,9 @@ Status Adapter::condition(const Rows& rows, const PoseView& pose, double varianc
     StridedRows A_r = block(rows, rows.rotation_column);
     const Pose x = to_pose(pose);
     core().current.cleaned = 0;
-    if (core().degeneracy.cleans_rows() && is_finite(x)) m.clean(rows, x, core());
-    const PriorTerm term = core().analyse(gram(A_r), gram(A_t));
+    if (core().degeneracy.cleans_rows() && is_finite(x)) m.clean(rows, x, variance, core());
+    const RowView view{view_of(rows, rows.rotation_column), view_of(rows, rows.position_column)};
+    const PriorTerm term = core().analyse(gram(A_r), gram(A_t), &view);
     if (term.projects) {
         A_t *= term.keep_t;
         A_r *= term.keep_r;
@@ -195,6 +240,7 @@ Status Adapter::end_scan(const PoseView& posterior, bool converged, double* cova
         status = impl_->remove_prior(covariance, size);
     }
     impl_->gate.end_scan();
+    impl_->choose_look(core());
     impl_->gate.book().close(core().current);
     core().publish();
     return status;
@@ -204,6 +250,7 @@ void Adapter::reset() {
     Plugin::reset();
     impl_->gate.reset();
     impl_->scans = 0;
+    impl_->look = Gate::Look::kAll;
     impl_->rested = false;
 }
 

@@ -8,21 +8,28 @@ namespace d2lio::fastlio {
 
 using G = GateConstants;
 
-void Gate::begin_scan(std::size_t points, const Vec3& sensor, bool patches) {
+namespace {
+
+constexpr std::size_t kSampleStep = 4;  ///< points of a scan
+
+}  // namespace
+
+void Gate::begin_scan(std::size_t points, const Vec3& sensor, Look look) {
     book_.begin_scan(points);
     planes_.resize(points);
-    keeps_patches_ = patches;
-    if (!patches) return;
+    look_ = look;
+    if (look == Look::kNot) return;
     planes_.assign(points, Plane{});  // no plane of the last scan passes for one of this
+    has_patch_.assign(points, 0);
     sensor_ = sensor.cast<float>();
     patches_.resize(points);
     points_.resize(points);
 }
 
 void Gate::end_scan() {
-    if (!keeps_patches_) return;
+    if (look_ == Look::kNot) return;
     for (std::size_t i = 0; i < patches_.size(); ++i) {
-        if (book_.verdict(i) == Verdict::kAccepted) bends_.add(patches_[i]);
+        if (has_patch_[i] && book_.verdict(i) == Verdict::kAccepted) bends_.add(patches_[i]);
     }
     bends_.end_scan();
 }
@@ -41,8 +48,9 @@ Verdict Gate::fit(const Candidate& c, const Rejector& rejector) {
     PlaneFitOptions options;
     options.max_distance = G::kPlaneDistance;
     if (rejector.host_gates()) options.min_spread_ratio = 0.0;  // upstream has no such check
+    PlaneMoments moments;
     switch (fit_plane(c.neighbours, static_cast<int>(c.neighbour_step), G::kNeighbours, options,
-                      planes_[c.index])) {
+                      planes_[c.index], look_ != Look::kNot ? &moments : nullptr)) {
         case PlaneStatus::kSingular:
             return Verdict::kSingularPlane;
         case PlaneStatus::kRough:
@@ -52,9 +60,15 @@ Verdict Gate::fit(const Candidate& c, const Rejector& rejector) {
     }
     // The same plane to the bit is a fit to the same neighbours: a search late in a scan finds few
     // others than the one before.
-    if (keeps_patches_ && !(planes_[c.index] == before)) {
-        patches_[c.index] = make_patch(c.neighbours, static_cast<int>(c.neighbour_step),
-                                       G::kNeighbours, planes_[c.index].normal, sensor_);
+    if (look_ == Look::kNot || planes_[c.index] == before) return Verdict::kAccepted;
+    const Eigen::Vector3f& normal = planes_[c.index].normal;
+    const SurfaceSide side =
+        side_of(normal, sensor_ - Eigen::Map<const Eigen::Vector3f>(c.neighbours));
+    has_patch_[c.index] =
+        look_ == Look::kAll || c.index % kSampleStep == 0 || bends_.at(side.facing) != 0.F;
+    if (has_patch_[c.index]) {
+        make_patch(c.neighbours, static_cast<int>(c.neighbour_step), G::kNeighbours, moments,
+                   normal, side, patches_[c.index]);
     }
     return Verdict::kAccepted;
 }
@@ -62,7 +76,8 @@ Verdict Gate::fit(const Candidate& c, const Rejector& rejector) {
 /// Signed distance from the surface: from its plane, and from what its bend adds to that.
 float Gate::residual(std::size_t i, const Eigen::Vector3f& p) const {
     const float distance = planes_[i].signed_distance(p);
-    return keeps_patches_ ? distance - bends_.sag(patches_[i], planes_[i].normal, p) : distance;
+    if (look_ == Look::kNot || !has_patch_[i]) return distance;
+    return distance - bends_.sag(patches_[i], planes_[i].normal, p);
 }
 
 Verdict Gate::accept(const Candidate& c, const Rejector& rejector, Correspondence* out) {
@@ -77,7 +92,7 @@ Verdict Gate::accept(const Candidate& c, const Rejector& rejector, Correspondenc
     const Plane& plane = planes_[c.index];
     const Eigen::Vector3f p(c.p_map[0], c.p_map[1], c.p_map[2]);
     const float distance = residual(c.index, p);
-    if (keeps_patches_) points_[c.index] = p;
+    if (look_ != Look::kNot) points_[c.index] = p;
     const double score = 1.0 - G::kResidualSlope * std::abs(static_cast<double>(distance)) /
                                    std::sqrt(c.lidar_range);
     const bool inside = rejector.host_gates() ? score > G::kResidualScore : std::isfinite(distance);

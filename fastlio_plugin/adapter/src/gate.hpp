@@ -25,28 +25,35 @@ struct GateConstants {
 /// its own point, so any number of threads may call it.
 class Gate {
   public:
-    /// @param sensor position, map frame. @param patches whether to look at the surfaces too.
-    void begin_scan(std::size_t points, const Vec3& sensor, bool patches);
+    /// How closely the surfaces behind the points are looked at.
+    enum class Look {
+        kNot,
+        kSample,  ///< every fourth, and those that face where the surface is known to bend
+        kAll,
+    };
+
+    /// @param sensor position, map frame.
+    void begin_scan(std::size_t points, const Vec3& sensor, Look look);
     Verdict accept(const Candidate& candidate, const Rejector& rejector, Correspondence* out);
     /// Learns from the surfaces that were accepted.
     void end_scan();
     void reset() { bends_.reset(); }
 
     VerdictBook& book() { return book_; }
-    /// Of an accepted point; only while patches are kept.
-    const Patch& patch(std::size_t i) const { return patches_[i]; }
+    /// Of an accepted point; null where none was made.
+    const Patch* patch(std::size_t i) const { return has_patch_[i] ? &patches_[i] : nullptr; }
     const Eigen::Vector3f& point(std::size_t i) const { return points_[i]; }  ///< map frame
 
   private:
     Verdict fit(const Candidate& candidate, const Rejector& rejector);
-
     float residual(std::size_t i, const Eigen::Vector3f& p) const;
 
     VerdictBook book_;
     std::vector<Plane> planes_;
-    bool keeps_patches_ = false;
+    Look look_ = Look::kNot;
     Eigen::Vector3f sensor_ = Eigen::Vector3f::Zero();
     std::vector<Patch> patches_;
+    std::vector<char> has_patch_;  ///< not bool: threads write neighbouring entries
     std::vector<Eigen::Vector3f> points_;
     BendField bends_;
 };

@@ -6,8 +6,6 @@
 
 namespace d2lio::fastlio {
 
-using Mat12 = Eigen::Matrix<double, 12, 12>;
-
 void Linearisation::reserve(Eigen::Index n) {
     if (H.rows() >= n) return;
     H.conservativeResize(n, 12);
@@ -32,6 +30,7 @@ bool Ieskf::tall_gain(const Mat23x23& P) {
     if (posterior.info() != Eigen::Success) return false;
     Eigen::Matrix<double, 23, 13> rhs = Eigen::Matrix<double, 23, 13>::Zero();
     rhs.topLeftCorner<12, 12>() = HtH;
+    HtH_ = HtH;
     rhs.block<12, 1>(0, 12) = Htr;
     const Eigen::Matrix<double, 23, 13> solved = posterior.solve(rhs);
     KH_ = solved.leftCols<12>();
@@ -50,6 +49,7 @@ bool Ieskf::wide_gain(const Mat23x23& P) {
     if (llt.info() != Eigen::Success) return false;
     const Eigen::MatrixXd K = llt.solve(PHt.transpose()).transpose();
     KH_ = K * H;
+    HtH_ = H.transpose() * H;
     Kr_ = K * rows_.residual.head(rows_.rows);
     return true;
 }
@@ -72,10 +72,9 @@ bool Ieskf::posterior(const NavState& predicted, const Mat23x23& P, const Vec23&
 
 PoseUncertainty::Match Ieskf::match(const Mat23x23& P) const {
     PoseUncertainty::Match m;
-    const auto H = rows_.H.topLeftCorner(rows_.rows, 6);
     m.gain = KH_;
     m.noise = KH_ * P.topRows<12>();
-    m.information = H.transpose() * H / options_.variance;
+    m.information = HtH_.topLeftCorner<6, 6>() / options_.variance;
     const double squares = rows_.residual.head(rows_.rows).squaredNorm();
     m.misfit = squares / (static_cast<double>(rows_.rows) * options_.variance);
     return m;

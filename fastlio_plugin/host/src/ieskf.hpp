@@ -63,7 +63,8 @@ class Ieskf {
 
     IeskfOptions options_;
     Linearisation rows_;
-    Vec23 Kr_ = Vec23::Zero();                                                  ///< K residual
+    Mat12 HtH_ = Mat12::Zero();  ///< of the last step
+    Vec23 Kr_ = Vec23::Zero();   ///< K residual
     Eigen::Matrix<double, 23, 12> KH_ = Eigen::Matrix<double, 23, 12>::Zero();  ///< first columns
 };
 

@@ -135,7 +135,8 @@ Status Adapter::condition_tangent(const PoseView& pose, double variance,
     if (!core().in_scan) return Status::kNoScan;
     const Mat6 AtA = Mat6Map(equations.AtA);
     if (!AtA.allFinite()) return Status::kBadInput;
-    PriorTerm term = core().analyse(AtA.topLeftCorner<3, 3>(), AtA.bottomRightCorner<3, 3>());
+    PriorTerm term =
+        core().analyse(AtA.topLeftCorner<3, 3>(), AtA.bottomRightCorner<3, 3>(), equations.rows);
     impl_->degenerate = core().current.weak_r + core().current.weak_t > 0;
     const Pose x = to_pose(pose);
     if (!is_finite(x)) return Status::kBadInput;

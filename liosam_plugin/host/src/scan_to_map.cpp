@@ -37,7 +37,10 @@ double weight_of(const MatchOptions& o, Feature feature, double distance, double
 }  // namespace
 
 ScanToMap::ScanToMap(Adapter& adapter, const MatchOptions& options, int threads)
-    : adapter_(adapter), options_(options), loop_(threads) {}
+    : adapter_(adapter),
+      options_(options),
+      loop_(threads),
+      spread_(static_cast<float>(mean_spread(options.map_leaf))) {}
 
 /// Nearest map points. By the triangle inequality the neighbours of the last search still lie
 /// within its reach plus the query's motion, so bounding the search there changes nothing but its
@@ -79,15 +82,17 @@ bool ScanToMap::fit(Feature feature, std::size_t index, const Neighbours& near,
     PlaneFitOptions options;
     options.max_distance = kPlaneDistance;
     options.min_spread_ratio = options_.min_spread_ratio;
-    const PlaneStatus status = fit_plane(xyz, kStride, kNeighbours, options, plane);
+    PlaneMoments moments;
+    const PlaneStatus status = fit_plane(xyz, kStride, kNeighbours, options, plane,
+                                         m.patch != nullptr ? &moments : nullptr);
     if (status == PlaneStatus::kSingular) adapter_.mark_singular(feature, index);
     if (status != PlaneStatus::kOk) return false;
     m.normal = plane.normal;
     float distance = plane.signed_distance(q);
     if (m.patch != nullptr) {
-        *m.patch = make_patch(xyz, kStride, kNeighbours, plane.normal, sensor_);
-        const auto spread = static_cast<float>(mean_spread(options_.map_leaf));
-        distance -= bends_.sag(*m.patch, plane.normal, q, spread);
+        const SurfaceSide side = side_of(plane.normal, sensor_ - near[0].point());
+        make_patch(xyz, kStride, kNeighbours, moments, plane.normal, side, *m.patch);
+        distance -= bends_.sag(*m.patch, plane.normal, q, spread_);
     }
     m.distance = static_cast<double>(distance);
     return true;
@@ -141,6 +146,19 @@ int ScanToMap::linearise(const MatchInput& in, const Pose& T, Mat6& AtA, Vec6& A
     return used;
 }
 
+/// The rows in use, without their weights.
+RowView ScanToMap::view_rows() {
+    unweighted_.clear();
+    for (const Row& row : rows_) {
+        if (row.used) unweighted_.push_back(row.jacobian / row.weight);
+    }
+    const auto block = [this](int column) -> RowView::Block {
+        const double* const first = unweighted_.empty() ? nullptr : unweighted_[0].data() + column;
+        return {first, static_cast<int>(unweighted_.size()), 6, 1};
+    };
+    return {block(0), block(3)};
+}
+
 double ScanToMap::mean_square() const {
     double squares = 0.0, weights = 0.0;
     for (const Row& row : rows_) {
@@ -151,37 +169,47 @@ double ScanToMap::mean_square() const {
     return weights > 0.0 ? squares / weights : 0.0;
 }
 
+/// The rows in use as RowCleaner sees them.
+class ScanToMap::UsedRows {
+  public:
+    UsedRows(const MatchOptions& options, std::vector<Row>& rows, const std::vector<Patch>& patches,
+             const Mat3& R)
+        : options_(options), rows_(rows), patches_(patches), R_(R) {
+        for (std::size_t i = 0; i < rows.size(); ++i) {
+            if (rows[i].used) used_.push_back(i);
+        }
+    }
+    std::size_t size() const { return used_.size(); }
+    Vec3 normal(std::size_t k) const { return rows_[used_[k]].normal(); }
+    const Patch* patch(std::size_t k) const {
+        return rows_[used_[k]].has_patch ? &patches_[used_[k]] : nullptr;
+    }
+    double trusted(std::size_t k, const Vec3& normal, const BlindDirections& blind) const {
+        if (options_.kernel_scale > 0.0) return 1.0;  // the weight is a robust one already
+        const Row& row = rows_[used_[k]];
+        return trust(row.residual / row.weight, normal, *patch(k), blind, options_.variance);
+    }
+    void replace(std::size_t k, const Vec3& /*normal*/, const CleanedRow& cleaned) {
+        Row& row = rows_[used_[k]];
+        const Vec3 kept = row.weight * cleaned.weight * cleaned.normal;
+        row.jacobian << row.p.cross(R_.transpose() * kept), kept;
+        row.residual *= cleaned.weight;
+    }
+
+  private:
+    const MatchOptions& options_;
+    std::vector<Row>& rows_;
+    const std::vector<Patch>& patches_;
+    const Mat3& R_;
+    std::vector<std::size_t> used_;
+};
+
 /// Takes what noise has put into the rows along blind directions out of them (method noise_aware).
-/// A line's row cannot prove anything there: of its neighbours nothing is known but the line.
 void ScanToMap::clean(const Pose& T) {
-    SurfaceSums sums;
-    for (std::size_t i = 0; i < rows_.size(); ++i) {
-        const Row& row = rows_[i];
-        if (row.used && row.has_patch) sums.add(row.normal(), patches_[i]);
-    }
-    const BlindDirections blind = adapter_.find_blind(sums);
+    UsedRows rows(options_, rows_, patches_, T.R);
+    const BlindDirections blind = adapter_.find_blind(cleaner_.sums(rows));
     if (blind.count == 0 || resting_) return;
-    proven_.assign(rows_.size(), Vec3::Zero());
-    ProvenSum sum;
-    for (std::size_t i = 0; i < rows_.size(); ++i) {
-        if (!rows_[i].used || !rows_[i].has_patch) continue;
-        const Vec3 n = rows_[i].normal();
-        proven_[i] = proven_share(n, patches_[i], blind, adapter_.noise_aware());
-        sum.add(n, proven_[i], blind);
-    }
-    int cleaned = 0;
-    for (std::size_t i = 0; i < rows_.size(); ++i) {
-        Row& row = rows_[i];
-        if (!row.used) continue;
-        const Vec3 n = row.normal();
-        const CleanedRow out = cleaned_row(n, proven_[i], blind, sum);
-        if (out.normal == n && out.weight == 1.0) continue;
-        const Vec3 kept = row.weight * out.weight * out.normal;
-        row.jacobian << row.p.cross(T.R.transpose() * kept), kept;
-        row.residual *= out.weight;
-        if (out.normal != n) ++cleaned;
-    }
-    adapter_.note_cleaned(cleaned);
+    adapter_.note_cleaned(cleaner_.clean(blind, adapter_.noise_aware(), rows));
 }
 
 /// Adds information W of the guess: the cost |e|^2_W, e = (Log(R_guess^T R), t - t_guess), in units
@@ -231,10 +259,10 @@ bool ScanToMap::step(const MatchInput& input, Pose& T, MatchReport& report) {
     }
     if (report.iterations == 0) find_remapping(AtA, report);
     report.information = AtA;
-    report.mean_square = mean_square();
     ++report.iterations;
+    const RowView rows = adapter_.counts_rows() ? view_rows() : RowView{};
     adapter_.condition_tangent({T.R.data(), T.t.data()}, options_.variance,
-                               {AtA.data(), Atb.data()});
+                               {AtA.data(), Atb.data(), adapter_.counts_rows() ? &rows : nullptr});
     if (prior_ != nullptr) add_prior(T, AtA, Atb);
     report.degenerate = adapter_.degenerate() || report.remapped;
     const Vec6 whole = AtA.ldlt().solve(Atb);
@@ -263,7 +291,10 @@ MatchReport ScanToMap::align(const MatchInput& input, Pose& T_map_imu, const Mat
     while (report.iterations < options_.max_iterations && step(input, T, report)) {
     }
     if (report.status != MatchStatus::kNumericalFailure) T_map_imu = T;
-    if (adapter_.reads_surfaces()) learn_bends();
+    if (adapter_.reads_surfaces()) {
+        report.mean_square = mean_square();
+        learn_bends();
+    }
     return report;
 }
 

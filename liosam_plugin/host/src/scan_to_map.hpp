@@ -5,7 +5,7 @@
 #include <vector>
 
 #include "d2lio/degeneracy/bend.hpp"
-#include "d2lio/degeneracy/blind.hpp"
+#include "d2lio/degeneracy/clean_rows.hpp"
 #include "d2lio/host/point_loop.hpp"
 #include "d2lio/liosam/adapter.hpp"
 #include "d2lio/map/ikd_tree.hpp"
@@ -43,7 +43,7 @@ struct MatchReport {
     bool remapped = false;    ///< the host's own remapping held back some direction
     Mat6 information =
         Mat6::Zero();          ///< A^T A of the scan's rows at the last iterate; tangent order
-    double mean_square = 0.0;  ///< of the rows' residuals at the last iterate, m^2
+    double mean_square = 0.0;  ///< of the rows' residuals at the last iterate, m^2 (noise_aware)
     double search_ms = 0.0;
 };
 
@@ -94,6 +94,8 @@ class ScanToMap {
         Patch* patch;  ///< where to put a plane's, or null
     };
 
+    class UsedRows;
+
     void search(const Eigen::Vector3f& query, const IkdTree& map, Memory& memory,
                 Neighbours& near) const;
     bool admit(Feature feature, std::size_t index, double range, const Neighbours& near,
@@ -105,6 +107,7 @@ class ScanToMap {
     int linearise(const MatchInput& input, const Pose& T, Mat6& AtA, Vec6& Atb);
     void find_remapping(const Mat6& AtA, MatchReport& report);
     bool step(const MatchInput& input, Pose& T, MatchReport& report);
+    RowView view_rows();
     double mean_square() const;
     void clean(const Pose& T);
     void add_prior(const Pose& T, Mat6& AtA, Vec6& Atb) const;
@@ -115,11 +118,13 @@ class ScanToMap {
     PointLoop loop_;
     bool bounded_search_ = true;
     std::vector<Row> rows_;
+    std::vector<Vec6> unweighted_;
     std::vector<Memory> memory_;
     Mat6 keep_ = Mat6::Identity();
     bool resting_ = false;
     std::vector<Patch> patches_;  ///< of the rows; only while the adapter reads surfaces
-    std::vector<Vec3> proven_;    ///< shares of the rows along the blind directions
+    RowCleaner cleaner_;
+    float spread_;  ///< of the means in the map of surfaces, m^2
     BendField bends_;
     Eigen::Vector3f sensor_ = Eigen::Vector3f::Zero();  ///< map frame
     const Mat6* prior_ = nullptr;                       ///< of the scan being aligned

@@ -16,7 +16,7 @@ namespace {
 constexpr double kRoomError = 0.05;  // m, over 4 s with 1 cm range noise
 constexpr Preset kPresets[] = {Preset::kLioSam, Preset::kD2Lio};
 const char* const kModes[] = {"off", "none", "fixed", "kiss", "point_adaptive"};
-const char* const kMethods[] = {"none", "paper", "remap"};
+const char* const kMethods[] = {"none", "paper", "remap", "tsvd", "xicp"};
 
 /// Scans of a run that get no pose: two start it, and LIO-SAM's interval leaves out every second.
 std::size_t without_pose(Preset preset) { return preset == Preset::kLioSam ? 20 : 2; }

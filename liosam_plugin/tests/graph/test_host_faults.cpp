@@ -289,7 +289,7 @@ class Fuzz {
 
     void choose_params() {
         const char* const modes[] = {"off", "none", "fixed", "kiss", "point_adaptive"};
-        const char* const methods[] = {"none", "paper", "remap"};
+        const char* const methods[] = {"none", "paper", "remap", "tsvd", "xicp"};
         params["rejection.mode"] = modes[engine_() % 5];
         params["degeneracy.method"] = methods[engine_() % 3];
         params["front_end"] = chance(0.5) ? "features" : "direct";

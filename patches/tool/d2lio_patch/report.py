@@ -18,7 +18,7 @@ d2lio:
   rejection:
     mode: point_adaptive  # off (upstream), none, fixed, kiss, point_adaptive
   degeneracy:
-    method: none          # none, paper, remap; noise_aware in FAST_LIO
+    method: none          # none, paper, remap, tsvd; xicp, noise_aware in FAST_LIO
 """
 
 

@@ -30,8 +30,8 @@ class BendField {
     /// @param spread of mean_spread(), where the neighbours are means.
     float sag(const Patch& patch, const Eigen::Vector3f& normal, const Eigen::Vector3f& p,
               float spread = 0.F) const {
-        const float bend = at(patch.facing);
-        return bend == 0.F ? 0.F : patch.side * bend * (patch.sag(normal, p) - spread);
+        const float bend = at(patch.side.facing);
+        return bend == 0.F ? 0.F : patch.side.sign * bend * (patch.sag(normal, p) - spread);
     }
     /// Closes a scan: older ones fade with a time constant of ten scans.
     void end_scan();

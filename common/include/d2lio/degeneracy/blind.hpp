@@ -21,7 +21,38 @@ struct BlindDirections {
     int count = 0;
     Mat3 axes = Mat3::Identity();  ///< columns, map frame, orthonormal; the first `count` matter
     Vec3 blend = Vec3::Zero();     ///< 0: leave the rows alone, 1: clean them
+    Vec3 variance = Vec3::Zero();  ///< of the predicted position along each axis, m^2
 };
+
+/// Tells at little cost the many rows of which proven_share() is zero.
+class ProofTest {
+  public:
+    ProofTest(const BlindDirections& blind, const NoiseAwareConfig& config);
+    bool may_pass(const Vec3& normal, const Patch& patch) const {
+        const Eigen::Vector3f n = normal.cast<float>();
+        for (int i = 0; i < count_; ++i) {
+            const auto d = axes_.col(i);
+            const float a = n.dot(d);
+            if (a * a > least_ * patch.formal_variance(d)) return true;
+        }
+        return false;
+    }
+
+  private:
+    Eigen::Matrix3f axes_;
+    int count_;
+    float least_;  ///< ratio of a component's square to its variance
+};
+
+/// A row's normal without its components along the blind directions, as far as those are cleaned.
+inline Vec3 without(const Vec3& normal, const BlindDirections& blind) {
+    Vec3 out = normal;
+    for (int i = 0; i < blind.count; ++i) {
+        const auto d = blind.axes.col(i);
+        out -= blind.blend[i] * normal.dot(d) * d;
+    }
+    return out;
+}
 
 /// How much of a row's components along the blind directions exceeds their noise: 0 none, 1 all.
 Vec3 proven_share(const Vec3& normal, const Patch& patch, const BlindDirections& blind,
@@ -34,19 +65,36 @@ struct ProvenSum {
     void add(const Vec3& normal, const Vec3& share, const BlindDirections& blind);
 };
 
-/// Sums over the accepted rows; see noise_share().
+/// Sums over the accepted rows; see noise_share(). In single precision: good for a share.
 class SurfaceSums {
   public:
     Mat3 information() const { return symmetric(n_); }  ///< of n n^T
     Mat3 noise() const { return symmetric(c_); }        ///< of the covariances of the normals
 
-    void add(const Vec3& normal, const Patch& patch);
+    void add(const Vec3& normal, const Patch& patch) {
+        const auto x = static_cast<float>(normal.x()), y = static_cast<float>(normal.y()),
+                   z = static_cast<float>(normal.z());
+        n_.add(x * x, x * y, x * z, y * y, y * z, z * z);
+        const auto& c = patch.covariance;
+        c_.add(c[0], c[1], c[2], c[3], c[4], c[5]);
+    }
 
   private:
-    using Upper = std::array<double, 6>;  ///< xx, xy, xz, yy, yz, zz
+    /// Scalars, which a loop keeps in registers.
+    struct Upper {
+        float xx = 0.F, xy = 0.F, xz = 0.F, yy = 0.F, yz = 0.F, zz = 0.F;
+        void add(float a, float b, float c, float d, float e, float f) {
+            xx += a;
+            xy += b;
+            xz += c;
+            yy += d;
+            yz += e;
+            zz += f;
+        }
+    };
     static Mat3 symmetric(const Upper& u);
 
-    Upper n_{}, c_{};
+    Upper n_, c_;
 };
 
 /// Finds the directions to clean.
@@ -64,6 +112,15 @@ BlindDirections find_blind(const NoiseShare& share, const Mat3& P_t,
 /// be a measurement, and move the map along.
 void stay_blind(const BlindDirections& before, BlindDirections& now);
 
+/// Weight of a row that speaks of a blind direction, by how well its residual agrees with the
+/// prediction: 1 / (1 + r^2 / (9 S)), the kernel of Geman and McClure (1987) at three sigmas, S the
+/// variance of the row, of its patch, and of prediction and map (3 cm) along the blind directions.
+/// A plane through neighbours of two surfaces is wrong by decimetres, and the only one to speak;
+/// scan after scan it would pull the pose along.
+/// @param residual m. @param variance of a row's residual, m^2.
+double trust(double residual, const Vec3& normal, const Patch& patch, const BlindDirections& blind,
+             double variance);
+
 /// A row after cleaning.
 struct CleanedRow {
     Vec3 normal;          ///< map frame, not of unit length where a component went
@@ -78,8 +135,9 @@ struct CleanedRow {
 /// Where a direction hangs on a few proven rows, they get half the weight, down from a component of
 /// about 0.05 on: scan after scan sees the same few surfaces, with the same error each time. Among
 /// many that averages out.
-/// @param share of proven_share(). @param sum over all rows of the scan.
+/// @param share of proven_share(). @param sum over all rows of the scan. @param trusted of trust(),
+/// which counts as far as the row speaks of a blind direction.
 CleanedRow cleaned_row(const Vec3& normal, const Vec3& share, const BlindDirections& blind,
-                       const ProvenSum& sum);
+                       const ProvenSum& sum, double trusted);
 
 }  // namespace d2lio

@@ -5,16 +5,33 @@
 #include <Eigen/Core>
 #include <array>
 
+#include "d2lio/geometry/plane.hpp"
+
 namespace d2lio {
+
+/// Number of bins of SurfaceSide::facing: the normal that looks at the sensor, its three components
+/// quartered.
+constexpr int kFacings = 64;
+
+/// Which side of a plane the sensor sees.
+struct SurfaceSide {
+    float sign = 1.F;  ///< 1: the fitted normal looks at the sensor, -1: away from it
+    int facing = 0;    ///< bin of the direction the surface faces
+};
+
+/// @param to_sensor from any point of the plane.
+SurfaceSide side_of(const Eigen::Vector3f& normal, const Eigen::Vector3f& to_sensor);
 
 /// What the neighbours of a plane fit say about the surface beside its plane: how uncertain the
 /// normal is, and how the surface bends. Map frame, m.
 struct Patch {
+    static constexpr int kCount = 5;  ///< neighbours
+
     Eigen::Vector3f centroid = Eigen::Vector3f::Zero();
+    std::array<float, 3 * kCount> offsets{};  ///< of the neighbours from the centroid
+    float variance = 0.F;                     ///< of a neighbour's height
     /// Covariance of the unit normal, which lies in the plane: xx, xy, xz, yy, yz, zz; rad^2.
     std::array<float, 6> covariance{};
-    /// What leaving out the most decisive neighbour adds to it: doubt doubt^T; rad.
-    Eigen::Vector3f doubt = Eigen::Vector3f::Zero();
     /// Regression of the neighbours' distances from the plane on their squared distances from the
     /// centroid: the bend is bend_rise / bend_run (1/m), its variance sigma^2 / bend_run.
     float bend_rise = 0.F;  ///< m^3
@@ -22,20 +39,39 @@ struct Patch {
     /// Plane fit of half the squared in-plane distance, which a bent surface adds to its plane.
     float sag_mean = 0.F;                                 ///< m^2
     Eigen::Vector3f sag_slope = Eigen::Vector3f::Zero();  ///< m, in the plane
-    float side = 1.F;  ///< 1: the fitted normal looks at the sensor, -1: away from it
-    int facing = 0;    ///< bin of the direction the surface faces
+    SurfaceSide side;
 
-    /// Variance of n . d for a direction d (unit), doubt included; with a second-order term, so
-    /// that a normal that is uncertain by more than half a radian says nothing about any direction.
-    /// @param a n . d of the fitted normal.
-    double variance_along(const Eigen::Vector3d& d, double a) const;
+    /// What leaving out the most decisive neighbour adds to the covariance: doubt doubt^T; rad.
+    /// Found at the first call, of which there may be one at a time.
+    /// @param normal the one the patch was made with.
+    const Eigen::Vector3f& doubt(const Eigen::Vector3f& normal) const {
+        if (!doubt_known_) doubt_ = find_doubt(normal);
+        doubt_known_ = true;
+        return doubt_;
+    }
+    void forget_doubt() { doubt_known_ = false; }
+    /// Variance of n . d for a direction d (unit), without doubt.
+    float formal_variance(const Eigen::Vector3f& d) const {
+        const auto& [xx, xy, xz, yy, yz, zz] = covariance;
+        return d.x() * (xx * d.x() + 2.F * (xy * d.y() + xz * d.z())) +
+               d.y() * (yy * d.y() + 2.F * yz * d.z()) + zz * d.z() * d.z();
+    }
+    /// Doubt included; with a second-order term, so that a normal that is uncertain by more than
+    /// half a radian says nothing about any direction. Never below formal_variance().
+    double variance_along(const Eigen::Vector3d& d, const Eigen::Vector3d& normal) const;
     /// Distance of a surface of unit bend from the fitted plane at p (m^2); multiply by the bend.
-    float sag(const Eigen::Vector3f& normal, const Eigen::Vector3f& p) const;
-};
+    float sag(const Eigen::Vector3f& normal, const Eigen::Vector3f& p) const {
+        const Eigen::Vector3f d = p - centroid;
+        const float off = normal.dot(d);
+        return 0.5F * (d.squaredNorm() - off * off) - sag_mean - sag_slope.dot(d);
+    }
 
-/// Number of bins of Patch::facing: the normal that looks at the sensor, its three components
-/// quartered.
-constexpr int kFacings = 64;
+  private:
+    Eigen::Vector3f find_doubt(const Eigen::Vector3f& normal) const;
+
+    mutable Eigen::Vector3f doubt_ = Eigen::Vector3f::Zero();
+    mutable bool doubt_known_ = false;
+};
 
 /// Patch of a plane fitted to `count` points.
 ///
@@ -45,8 +81,10 @@ constexpr int kFacings = 64;
 /// plane (four points of a scan line and one beside it), nothing is known of the surface.
 /// (Sherman-Morrison on S; the propagation is that of Hatleskog, Alexis, "Probabilistic degeneracy
 /// detection for point-to-plane error minimization", 2024, with map noise instead of scan noise.)
-/// @param normal of the fitted plane, unit length. @param sensor where the surface is seen from.
-Patch make_patch(const float* xyz, int stride, int count, const Eigen::Vector3f& normal,
-                 const Eigen::Vector3f& sensor);
+/// @param moments of the points. @param normal of the fitted plane, unit length.
+/// @param count of the points; with fewer than Patch::kCount nothing is known, the rest is left
+/// out.
+void make_patch(const float* xyz, int stride, int count, const PlaneMoments& moments,
+                const Eigen::Vector3f& normal, const SurfaceSide& side, Patch& patch);
 
 }  // namespace d2lio

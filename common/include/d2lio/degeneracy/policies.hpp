@@ -53,4 +53,15 @@ struct RemapPrior {
     PriorTerm evaluate(const Spectrum& spectrum, const Mat3& P_r, const Mat3& P_t) const;
 };
 
+/// Truncated singular value decomposition of the Jacobian's blocks: directions whose singular value
+/// is below the block's largest by more than `condition` keep the prediction (Hansen, "The
+/// truncated SVD as a method for regularization", 1987; in point cloud registration: Tuna et al.,
+/// "Informed, constrained, aligned", 2024). Unlike RemapPrior's threshold it does not depend on how
+/// many points there are.
+struct TruncatedPrior {
+    double condition = 10.0;  ///< largest ratio of singular values that is kept
+
+    PriorTerm evaluate(const Spectrum& spectrum, const Mat3& P_r, const Mat3& P_t) const;
+};
+
 }  // namespace d2lio

@@ -6,11 +6,12 @@
 
 #include "d2lio/config/params.hpp"
 #include "d2lio/degeneracy/blind.hpp"
+#include "d2lio/degeneracy/localizability.hpp"
 #include "d2lio/degeneracy/policies.hpp"
 
 namespace d2lio {
 
-enum class DegeneracyMethod { kNone, kPaper, kRemap, kNoiseAware };
+enum class DegeneracyMethod { kNone, kPaper, kRemap, kTruncatedSvd, kXIcp, kNoiseAware };
 
 struct DegeneracyConfig {
     DegeneracyMethod method = DegeneracyMethod::kNone;
@@ -20,11 +21,15 @@ struct DegeneracyConfig {
     bool inflate_only = true;    ///< the kept covariance leaves the prior's rows out
     double threshold_r = 100.0;  ///< m^2, method remap
     double threshold_t = 100.0;  ///< points, method remap
+    double condition = 10.0;     ///< method tsvd
+    double kappa_2 = 180.0;      ///< method xicp
+    double kappa_3 = 35.0;       ///< method xicp
     double weak_share = 0.03;    ///< of the trace; smaller eigenvalues are reported as weak
     NoiseAwareConfig noise_aware;
     bool rest = true;  ///< method noise_aware: hold the pose until the first motion
 
     bool cleans_rows() const { return method == DegeneracyMethod::kNoiseAware; }
+    bool counts_rows() const { return method == DegeneracyMethod::kXIcp; }
 
     /// Binds the keys `degeneracy.*`.
     void bind(ParamTable& table);
@@ -39,10 +44,12 @@ class DirectionalPrior {
 
     bool active() const { return !std::holds_alternative<NoPrior>(policy_); }
     /// @param P_r, P_t covariance blocks of the predicted pose (rad^2, body; m^2, map).
-    PriorTerm evaluate(const Spectrum& spectrum, const Mat3& P_r, const Mat3& P_t) const;
+    /// @param rows behind the spectrum; method xicp does nothing without them.
+    PriorTerm evaluate(const Spectrum& spectrum, const Mat3& P_r, const Mat3& P_t,
+                       const RowView* rows = nullptr) const;
 
   private:
-    std::variant<NoPrior, PaperPrior, RemapPrior> policy_;
+    std::variant<NoPrior, PaperPrior, RemapPrior, TruncatedPrior, XIcpPrior> policy_;
 };
 
 /// Up to six pseudo-measurement rows that carry a prior into a filter or a least squares: their

@@ -3,6 +3,7 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <array>
 
 namespace d2lio {
 
@@ -28,12 +29,20 @@ struct PlaneFitOptions {
     double min_spread_ratio = 1e-4;
 };
 
+/// First and second moments of the points of a fit.
+struct PlaneMoments {
+    Eigen::Vector3f centroid = Eigen::Vector3f::Zero();  ///< m
+    /// About the centroid, not divided by the number of points: xx, xy, xz, yy, yz, zz; m^2.
+    std::array<float, 6> scatter{};
+};
+
 /// Fits the plane that minimises sum_i (u . x_i + 1)^2, the form FAST-LIO2 uses, in closed form.
 /// With centroid c, scatter S of N points: u is parallel to S^-1 c (Sherman-Morrison on
 /// S + N c c^T), evaluated through the adjugate of S, so that exact planes and coordinates far from
 /// the origin lose no digits.
 /// @param xyz first coordinate of the first point; points are `stride` floats apart, map frame, m.
+/// @param moments where to put those of three points or more, whatever becomes of the fit.
 PlaneStatus fit_plane(const float* xyz, int stride, int count, const PlaneFitOptions& options,
-                      Plane& plane);
+                      Plane& plane, PlaneMoments* moments = nullptr);
 
 }  // namespace d2lio

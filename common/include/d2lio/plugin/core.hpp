@@ -44,9 +44,12 @@ struct Plugin::Core {
     /// Starts a record. @param usable false: the scan runs on the host's own gates, without prior.
     Status begin(bool usable, const Pose& previous);
     /// Notes the spectrum of the accepted rows and the prior that follows from it.
-    PriorTerm analyse(const Mat3& AtA_r, const Mat3& AtA_t);
+    /// @param rows behind the blocks, null where the host has none to show.
+    PriorTerm analyse(const Mat3& AtA_r, const Mat3& AtA_t, const RowView* rows);
     /// Directions that noise may dominate, noted in the record (method noise_aware).
     BlindDirections find_blind(const SurfaceSums& sums);
+    /// Takes the finding back.
+    void forget_blind();
     /// Learns from the estimate. The scan stays open for the record until publish().
     Status end(const Pose& posterior, bool converged);
     /// Makes the current record the last one.

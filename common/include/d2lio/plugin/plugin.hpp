@@ -63,8 +63,10 @@ class Plugin {
 
     /// True when a rejection mode other than off is set.
     bool rejects() const;
-    /// True when the degeneracy method adds a prior or projects (paper, remap).
+    /// True when the degeneracy method adds a prior or projects (paper, remap, tsvd, xicp).
     bool has_prior() const;
+    /// True when the method counts the rows' contributions (xicp): without rows it does nothing.
+    bool counts_rows() const;
     /// True when the method must see every correspondence, whatever the rejection mode
     /// (noise_aware).
     bool reads_surfaces() const;

@@ -7,6 +7,7 @@
 #include <memory>
 
 #include "d2lio/plugin/plugin.hpp"
+#include "d2lio/plugin/row_view.hpp"
 
 /// The only surface a LIO-SAM host or a patched upstream touches. C++14, plain pointers only: the
 /// two sides may be built with different standards and Eigen alignments. Lengths in m, angles in
@@ -45,6 +46,8 @@ struct Candidate {
 struct NormalEquations {
     double* AtA;  ///< 6 x 6, symmetric
     double* Atb;  ///< 6
+    /// The rows themselves, for condition_tangent() with a method that counts them; null: none.
+    const RowView* rows = nullptr;
 };
 
 class Adapter : public Plugin {

@@ -52,10 +52,11 @@ class UpstreamGlue {
         settings.finish(adapter_, {"diagnostics.csv", "diagnostics.topic", "mapping.variance",
                                    "imu.correction_rotation", "imu.correction_translation",
                                    "imu.degenerate_rotation", "imu.degenerate_translation"});
-        if (adapter_.reads_surfaces()) {  // upstream shows the adapter no neighbours
+        if (adapter_.reads_surfaces() || adapter_.counts_rows()) {  // upstream shows no rows
             throw std::invalid_argument(
-                "D2-LIO cannot start:\n  degeneracy.method = noise_aware: not inside LIO-SAM; "
-                "allowed there: none, paper, remap");
+                std::string("D2-LIO cannot start:\n  degeneracy.method = ") +
+                (adapter_.counts_rows() ? "xicp" : "noise_aware") +
+                ": not inside LIO-SAM; allowed there: none, paper, remap, tsvd");
         }
         changes_ = adapter_.rejects() || adapter_.has_prior();
         if (topic == "-") topic = changes_ ? "d2lio/diagnostics" : "";
