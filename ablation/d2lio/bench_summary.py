@@ -28,6 +28,7 @@ PLUGIN_COSTS = (
     ("FAST-LIO2", "BM_PluginCost", f"; goal <= {COST_GOAL_PERCENT:g} %"),
     ("D²-LIO", "BM_LioSamPluginCost", ""),
 )
+NOISE_AWARE_SCENES = {"0": "room", "3": "vaulted tunnel"}  # by radius of the tunnel, m
 SCAN_PERIOD_MS = 100.0  # of a VLP-16 at 10 Hz
 PERIOD_SHARE = 0.5  # of the scan period that D2-LIO may take on one core
 WIDTH = 110  # columns where the output is no terminal
@@ -115,6 +116,27 @@ def plugin_cost(entries: list[Entry]) -> list[str]:
     return lines
 
 
+def noise_aware_cost(entries: list[Entry]) -> list[str]:
+    """Cost of method noise_aware in FAST-LIO2: medians over the repetitions, one line a scene."""
+    lines = []
+    for radius, scene in NOISE_AWARE_SCENES.items():
+        found = [
+            e
+            for e in _named(entries, "BM_NoiseAwareCost")
+            if e["name"].split("/")[1] == f"pipe:{radius}"
+        ]
+        if not found:
+            lines.append(f"FAST-LIO2, noise_aware, {scene}: not measured")
+            continue
+        shares = [e["share_percent"] for e in found]
+        lines.append(
+            f"FAST-LIO2, noise_aware, {scene}: {median(shares):.1f} % of search and update on top "
+            f"(median of {len(shares)}, {min(shares):.1f} … {max(shares):.1f}; the same scan and "
+            "map as with none)"
+        )
+    return lines
+
+
 def analysis_cost(entries: list[Entry]) -> str:
     """Absolute cost of the degeneracy analysis, which the host makes in every mode."""
     found = _named(entries, "BM_Condition")
@@ -166,7 +188,7 @@ def main(arguments: list[str]) -> int:
     if street.row_count:
         console.print(street)
     console.print(tree_table(entries))
-    for line in (*period_share(entries), *plugin_cost(entries)):
+    for line in (*period_share(entries), *plugin_cost(entries), *noise_aware_cost(entries)):
         console.print(line, highlight=False)
     console.print(analysis_cost(entries))
     return 0

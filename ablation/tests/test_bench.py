@@ -115,6 +115,20 @@ def test_half_the_scan_period() -> None:
     assert bench_summary.street_table([entry, off, lost]).row_count == 3
 
 
+def test_cost_of_noise_aware_by_scene() -> None:
+    entries = [
+        {
+            "name": f"BM_NoiseAwareCost/pipe:{radius}/iterations:300/repeats:5",
+            "share_percent": share,
+        }
+        for radius, share in ((0, 7.0), (0, 9.0), (0, 8.0), (3, 14.0))
+    ]
+    room, tunnel = bench_summary.noise_aware_cost(entries)
+    assert "room: 8.0 % of search and update on top (median of 3, 7.0 … 9.0" in room
+    assert "vaulted tunnel: 14.0 %" in tunnel
+    assert all("not measured" in line for line in bench_summary.noise_aware_cost([]))
+
+
 @needs_gtsam
 def test_a_short_drive_holds(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     out = tmp_path / "drive.json"

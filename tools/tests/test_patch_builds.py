@@ -239,10 +239,10 @@ def test_every_mode_and_method_runs(
     checkout: Checkout, tmp_path: Path, mode: str, method: str
 ) -> None:
     record = tmp_path / "record.csv"
-    if method == "noise_aware" and checkout.host == "lio_sam":  # it shows the adapter no neighbours
+    if method in ("xicp", "noise_aware") and checkout.host == "lio_sam":  # it shows no rows
         refused = start(checkout.program, f"rejection/mode={mode}", f"degeneracy/method={method}")
         assert refused.returncode != 0
-        assert "noise_aware: not inside LIO-SAM" in refused.stderr
+        assert f"{method}: not inside LIO-SAM" in refused.stderr
         return
     printed = output(
         checkout.program,
@@ -251,7 +251,8 @@ def test_every_mode_and_method_runs(
         f"diagnostics/csv={record}",
     )
     assert off_truth(printed) < NEAR_TRUTH_M
-    assert (printed == checkout.unpatched) == (mode == "off" and method == "none")
+    if method not in ("tsvd", "xicp"):  # which act where a direction is weak: none need be here
+        assert (printed == checkout.unpatched) == (mode == "off" and method == "none")
     rows = list(csv.DictReader(record.open(encoding="utf-8")))
     stamps = [float(row["stamp"]) for row in rows]
     assert stamps == pytest.approx([pose[0] for pose in poses(printed)], abs=1e-8)

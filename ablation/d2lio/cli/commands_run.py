@@ -47,7 +47,10 @@ def run(
         typer.Option(help="off, none, fixed, kiss or point_adaptive; unset is the host's own."),
     ] = None,
     degeneracy: Annotated[
-        str | None, typer.Option(help="none, paper, remap, tsvd, xicp or noise_aware; unset is the host's own.")
+        str | None,
+        typer.Option(
+            help="none, paper, remap, tsvd, xicp or noise_aware; unset is the host's own."
+        ),
     ] = None,
     assignments: Annotated[
         list[str] | None, typer.Option("--set", metavar="KEY=VALUE", help="Host parameter.")
