@@ -24,36 +24,19 @@ from rich.table import Table
 from scipy.integrate import cumulative_trapezoid
 from scipy.spatial.transform import Rotation
 
-from d2lio.datasets import ImuBlock, Source, open_source, timed_events
+from d2lio.datasets import ImuBlock, Source, open_source
 from d2lio.datasets.events import NS_PER_S, Float64, Int64
 from d2lio.errors import DataError
-from d2lio.hosts import NEED_GTSAM, liosam_missing, load_host
 from d2lio.metrics import Trajectory, read_tum
 from d2lio.metrics.tum import interpolate
 from d2lio.output import replace_file
+from d2lio.seeds import MAX_GAP_S, REJECTION, Track, built_hosts, pose_errors, track
 from d2lio.simulator import simulate
 from d2lio.simulator.imu import GRAVITY
 from d2lio.simulator.pipeline import TRUTH_FILE
 from d2lio.simulator.trajectory import STANDSTILL
-from d2lio.source_params import all_params
 
-METHOD = "noise_aware"
-REJECTION: dict[str, str | None] = {"fastlio": "off", "d2lio": None}  # None: the host's default
 WORLD_GRAVITY = np.array([0.0, 0.0, -GRAVITY])
-MAX_GAP_S = 0.05  # of the ground truth, which has the IMU's rate
-
-
-@dataclass(frozen=True, slots=True)
-class Track:
-    """What a host estimated.
-
-    Attributes:
-        trajectory: T_map_imu at the ends of the scans.
-        covariance: float64 [N, 6, 6], x y z rx ry rz in the map, m and rad.
-    """
-
-    trajectory: Trajectory
-    covariance: Float64
 
 
 class EndError(NamedTuple):
@@ -119,55 +102,18 @@ def bound(source: Source, truth: Trajectory) -> float:
     return dead_reckoning_error(stamps, accel, truth)
 
 
-def track(source: Source, host: str, rejection: str | None, method: str | None = METHOD) -> Track:
-    """Runs a host over a recording on one thread; None leaves mode or method to the host.
-
-    Raises:
-        DataError: no scan gave a pose.
-    """
-    params = all_params(source.config, host, rejection, method, {})
-    estimator = load_host(host)(params, 1)
-    poses: list[tuple[int, Float64, Float64]] = []
-
-    def drain() -> None:
-        while (result := estimator.step()) is not None:
-            if result.has_pose:
-                pose = np.array(result.T_map_imu)
-                poses.append((result.stamp, pose, np.array(result.covariance)))
-
-    for event in timed_events(source.reader, log_times=source.log_times):
-        if isinstance(event, ImuBlock):
-            estimator.add_imu(event.stamps, event.gyro, event.accel, event.orientation)
-        else:
-            estimator.add_scan(event.stamp, event.xyz, event.dt_ns, event.intensity, event.ring)
-        drain()
-    estimator.finish()
-    drain()
-    if not poses:
-        raise DataError(f"{source.name}: {host} gave no pose")
-    stamps, matrices, covariance = (np.array(column) for column in zip(*poses, strict=True))
-    quaternions = Rotation.from_matrix(matrices[:, :3, :3]).as_quat()
-    return Track(Trajectory(stamps, matrices[:, :3, 3], quaternions), covariance)
-
-
 def end_error(estimate: Track, truth: Trajectory) -> EndError:
     """Error of the last pose after aligning position and orientation of the first one.
 
     Raises:
         DataError: the truth does not cover the estimate.
     """
-    poses = estimate.trajectory
-    true = interpolate(truth, poses.stamps, MAX_GAP_S)
-    if len(true) < len(poses):
-        raise DataError("the ground truth does not cover the estimate")
-    first, first_true = (Rotation.from_quat(p.quaternions[0]) for p in (poses, true))
-    to_world = first_true * first.inv()
-    motion = true.positions[-1] - true.positions[0]
+    positions = estimate.trajectory.positions
+    error = pose_errors(estimate, truth)[-1, :3]
+    motion = positions[-1] - positions[0] - error  # the true one, in the map
     axis = motion / np.linalg.norm(motion)
-    error = to_world.apply(poses.positions[-1] - poses.positions[0]) - motion
     along = float(error @ axis)
-    in_map = to_world.inv().apply(axis)
-    variance = float(in_map @ estimate.covariance[-1, :3, :3] @ in_map)
+    variance = float(axis @ estimate.covariance[-1, :3, :3] @ axis)
     return EndError(along, float(np.linalg.norm(error - along * axis)), math.sqrt(variance))
 
 
@@ -221,14 +167,8 @@ def main(arguments: list[str]) -> int:
     parser.add_argument("--duration", type=float, help="s; default of the scene: 60 m")
     parser.add_argument("--out", type=Path, help="CSV file")
     options = parser.parse_args(arguments)
-    hosts = options.hosts.split(",")
-    if options.seeds < 1 or not set(hosts) <= set(REJECTION):
-        parser.error(f"--seeds must be at least 1, --hosts among {', '.join(REJECTION)}")
     console = Console() if sys.stdout.isatty() else Console(width=110)
-    why = liosam_missing()
-    if why is not None:
-        console.print(f"left out: {', '.join(NEED_GTSAM)}, {why}", highlight=False)
-        hosts = [host for host in hosts if host not in NEED_GTSAM]
+    hosts = built_hosts(parser, options, console)
     rows: list[Row] = []
     for seed in range(options.seeds if hosts else 0):
         rows += measure(seed, hosts, options.duration)

@@ -20,16 +20,12 @@ from typing import NamedTuple
 import numpy as np
 from rich.console import Console
 from rich.table import Table
-from scipy.spatial.transform import Rotation
 from scipy.stats import chi2
 
-from d2lio.bare_tunnel import MAX_GAP_S, METHOD, REJECTION, Track, track
 from d2lio.datasets import open_source
 from d2lio.datasets.events import Float64
-from d2lio.errors import DataError
-from d2lio.hosts import NEED_GTSAM, liosam_missing
-from d2lio.metrics import Trajectory, read_tum
-from d2lio.metrics.tum import interpolate
+from d2lio.metrics import read_tum
+from d2lio.seeds import METHOD, REJECTION, built_hosts, pose_errors, track
 from d2lio.simulator import simulate
 from d2lio.simulator.pipeline import TRUTH_FILE
 
@@ -45,23 +41,6 @@ class Nees(NamedTuple):
     pose: Float64
     position: Float64
     rotation: Float64
-
-
-def pose_errors(estimate: Track, truth: Trajectory) -> Float64:
-    """Errors with the first pose aligned, x y z rx ry rz in the map, m and rad, float64 [N, 6].
-
-    Raises:
-        DataError: the truth does not cover the estimate.
-    """
-    poses = estimate.trajectory
-    true = interpolate(truth, poses.stamps, MAX_GAP_S)
-    if len(true) < len(poses):
-        raise DataError("the ground truth does not cover the estimate")
-    rotation, rotation_true = (Rotation.from_quat(p.quaternions) for p in (poses, true))
-    to_map = rotation[0] * rotation_true[0].inv()
-    motion = to_map.apply(true.positions - true.positions[0])
-    turned = rotation * (to_map * rotation_true).inv()
-    return np.hstack([poses.positions - poses.positions[0] - motion, turned.as_rotvec()])
 
 
 def nees(errors: Float64, covariance: Float64) -> Nees:
@@ -129,14 +108,8 @@ def main(arguments: list[str]) -> int:
     parser.add_argument("--hosts", default=",".join(REJECTION), help="separated by commas")
     parser.add_argument("--duration", type=float, help="s; default: each scene's own")
     options = parser.parse_args(arguments)
-    hosts = options.hosts.split(",")
-    if options.seeds < 1 or not set(hosts) <= set(REJECTION):
-        parser.error(f"--seeds must be at least 1, --hosts among {', '.join(REJECTION)}")
     console = Console() if sys.stdout.isatty() else Console(width=110)
-    why = liosam_missing()
-    if why is not None:
-        console.print(f"left out: {', '.join(NEED_GTSAM)}, {why}", highlight=False)
-        hosts = [host for host in hosts if host not in NEED_GTSAM]
+    hosts = built_hosts(parser, options, console)
     found: dict[tuple[str, str], list[Nees]] = {}
     for scene in options.scenes.split(",") if hosts else ():
         for seed in range(options.first_seed, options.first_seed + options.seeds):

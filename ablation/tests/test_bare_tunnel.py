@@ -12,10 +12,11 @@ import numpy as np
 import pytest
 from built import WHY_NOT, host_params
 from d2lio import bare_tunnel
-from d2lio.bare_tunnel import EndError, Row, Track, dead_reckoning_error, end_error
+from d2lio.bare_tunnel import EndError, Row, dead_reckoning_error, end_error
 from d2lio.errors import DataError
 from d2lio.hosts import NEED_GTSAM
 from d2lio.metrics import Trajectory
+from d2lio.seeds import Track
 from d2lio.simulator import IMU_GRADES, Seeds
 from d2lio.simulator import imu as imu_model
 from d2lio.simulator.imu import ImuGrade

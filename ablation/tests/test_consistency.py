@@ -7,11 +7,11 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from built import host_params
-from d2lio import consistency
-from d2lio.bare_tunnel import REJECTION, Track
-from d2lio.consistency import MOMENTS, band, nees, pose_errors
+from d2lio import consistency, seeds
+from d2lio.consistency import MOMENTS, band, nees
 from d2lio.errors import DataError
 from d2lio.metrics import Trajectory
+from d2lio.seeds import REJECTION, Track, pose_errors
 from scipy.spatial.transform import Rotation
 
 DRAWS = 4000
@@ -106,7 +106,7 @@ def test_command_prints_scene_by_scene(capsys: pytest.CaptureFixture[str]) -> No
 def test_command_leaves_out_what_is_not_built(
     capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(consistency, "liosam_missing", lambda: "no GTSAM")
+    monkeypatch.setattr(seeds, "liosam_missing", lambda: "no GTSAM")
     assert consistency.main(["--scenes", "room", "--hosts", "d2lio"]) == 0
     assert "left out" in capsys.readouterr().out
 

@@ -16,11 +16,12 @@ from pathlib import Path
 
 import pytest
 from built import host_params
-from d2lio.bare_tunnel import METHOD, REJECTION, EndError, end_error, track
+from d2lio.bare_tunnel import EndError, end_error
 from d2lio.datasets import open_source
 from d2lio.metrics import read_tum
 from d2lio.metrics.alignment import aligned_rmse
 from d2lio.metrics.tum import interpolate
+from d2lio.seeds import METHOD, REJECTION, track
 from d2lio.simulator import simulate
 
 DURATION = 12.0  # s, of which 2 s standstill

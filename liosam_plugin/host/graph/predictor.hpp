@@ -37,8 +37,8 @@ class Predictor {
     /// Takes over an estimate that contains the prediction (method noise_aware): velocity, biases
     /// and gravity follow by what they share with the pose, as in a Kalman filter.
     /// @param covariance of the estimate, absolute in the map; rotation (body), position (map).
-    /// @param information of the scan's own rows, same order. @param misfit see
-    /// PoseUncertainty::update().
+    /// @param information of the scan's own rows, same order. @param misfit as
+    /// PoseUncertainty::Match::misfit.
     void fuse(const Pose& T_map_imu, const Mat6& covariance, const Mat6& information,
               double misfit);
     /// See PoseUncertainty; empty unless start_filter() was called.
