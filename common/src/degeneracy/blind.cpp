@@ -18,7 +18,9 @@ constexpr double kSameAxis = 0.9;    ///< cosine between the axes of one directi
 /// The test of a row is soft: between these multiples of the threshold it fades.
 constexpr double kSoftFrom = 0.7, kSoftTo = 1.3;
 constexpr double kSpeaks = 0.05;  ///< component from which on a row speaks of a blind direction
-constexpr double kSharedWeight = 0.5;         ///< of a row that does, if it is the only one
+constexpr double kSharedWeight = 0.5;  ///< of a row that does, if it is the only one
+/// Of a filter that takes the map for the truth: its errors are 4 to 9 times its sigma.
+constexpr double kOverConfidence = 5.0 * 5.0;
 constexpr double kMapVariance = 0.03 * 0.03;  ///< m^2, of the map along a blind direction
 constexpr double kSurprise = 3.0;             ///< sigmas at which a row's weight is halved
 constexpr double kFew = 20.0;                 ///< rows' worth of proven information that is little
@@ -113,7 +115,7 @@ double trust(double residual, const Vec3& normal, const Patch& patch, const Blin
     double S = variance + static_cast<double>(patch.variance);
     for (int i = 0; i < blind.count; ++i) {
         const double a = normal.dot(blind.axes.col(i));
-        S += a * a * (blind.variance[i] + kMapVariance);
+        S += a * a * (kOverConfidence * blind.variance[i] + kMapVariance);
     }
     const double allowed = kSurprise * kSurprise * S;
     const double out = allowed / (allowed + residual * residual);

@@ -199,13 +199,13 @@ TEST(Trust, HalvesAtThreeSigmasOfRowPatchPredictionAndMapTogether) {
     Patch patch;
     patch.variance = 4e-4F;
     BlindDirections blind = blind_x();
-    blind.variance[0] = 25e-4;
+    blind.variance[0] = 1e-4;
     const Vec3 n = leaning(0.6);
     const double S = 1e-3 + 4e-4 + 0.36 * (25e-4 + 9e-4);
     EXPECT_NEAR(trust(3.0 * std::sqrt(S), n, patch, blind, 1e-3), 0.5, 1e-6);
     EXPECT_NEAR(trust(-3.0 * std::sqrt(S), n, patch, blind, 1e-3), 0.5, 1e-6);
     EXPECT_EQ(trust(0.0, n, patch, blind, 1e-3), 1.0);
-    EXPECT_LT(trust(0.5, n, patch, blind, 1e-3), 0.1);
+    EXPECT_LT(trust(0.8, n, patch, blind, 1e-3), 0.1);
     patch.variance = std::numeric_limits<float>::quiet_NaN();
     EXPECT_EQ(trust(0.1, n, patch, blind, 1e-3), 0.0);
 }

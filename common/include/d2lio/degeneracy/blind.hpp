@@ -114,7 +114,8 @@ void stay_blind(const BlindDirections& before, BlindDirections& now);
 
 /// Weight of a row that speaks of a blind direction, by how well its residual agrees with the
 /// prediction: 1 / (1 + r^2 / (9 S)), the kernel of Geman and McClure (1987) at three sigmas, S the
-/// variance of the row, of its patch, and of prediction and map (3 cm) along the blind directions.
+/// variance of the row, of its patch, and of prediction (five times the filter's sigma, which is
+/// too small) and map (3 cm) along the blind directions.
 /// A plane through neighbours of two surfaces is wrong by decimetres, and the only one to speak;
 /// scan after scan it would pull the pose along.
 /// @param residual m. @param variance of a row's residual, m^2.
