@@ -19,7 +19,7 @@ class SyntheticRoom {
     static constexpr Stamp kStart = 86'400'000'000'000;
     static constexpr Stamp kImuPeriod = 5'000'000, kScanPeriod = 100'000'000;
     Vec3 half{5.65, 4.6, 1.35};  ///< half extents, m
-    double pipe = 0.0;               ///< radius of a round tunnel along x instead of the walls, m
+    double pipe = 0.0;           ///< radius of a round tunnel along x instead of the walls, m
     int columns = 180, rings = 16;
 
     static Pose T_imu_lidar() { return {exp_so3(Vec3(0.01, -0.02, 0.03)), Vec3(0.03, 0.05, 0.08)}; }
