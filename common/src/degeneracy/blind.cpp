@@ -124,12 +124,10 @@ double trust(double residual, const Vec3& normal, const Patch& patch, const Blin
 
 CleanedRow cleaned_row(const Vec3& normal, const Vec3& share, const BlindDirections& blind,
                        const ProvenSum& sum, double trusted) {
-    CleanedRow out{normal, 1.0};
+    CleanedRow out{without(normal, blind, share), 1.0};
     double speaks = 0.0, alone = 0.0;
     for (int i = 0; i < blind.count; ++i) {
-        const Vec3 d = blind.axes.col(i);
-        const double a = normal.dot(d);
-        out.normal -= blind.blend[i] * (1.0 - share[i]) * a * d;
+        const double a = normal.dot(blind.axes.col(i));
         const double proven = blind.blend[i] * share[i] * share[i] * a * a;
         speaks += proven;
         alone += proven * kFew / (kFew + sum.information[i]);

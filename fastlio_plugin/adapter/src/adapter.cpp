@@ -159,7 +159,7 @@ class HostRows {
         return trust(rows_.residual[k], normal, *patch(k), blind, variance_);
     }
 
-    void replace(std::size_t k, const Vec3& normal, const CleanedRow& cleaned) {
+    void replace(std::size_t k, const CleanedRow& cleaned, bool lost) {
         const Vec3 arm = gate_.point(accepted_[k]).cast<double>() - t_;
         const Vec3 kept = cleaned.weight * cleaned.normal;
         put(k, rows_.position_column, kept);
@@ -167,7 +167,7 @@ class HostRows {
         rows_.residual[k] *= cleaned.weight;
         if (rows_.extrinsic_column < 0) return;
         // A row that lost something tells nothing of the extrinsic.
-        const double share = cleaned.normal == normal ? cleaned.weight : 0.0;
+        const double share = lost ? 0.0 : cleaned.weight;
         double* const extrinsic = entry(k, rows_.extrinsic_column);
         for (int c = 0; c < 6; ++c) extrinsic[c * rows_.column_step] *= share;
     }

@@ -28,25 +28,28 @@ void ScanMatcher::begin(const std::vector<Eigen::Vector3f>& points, const IkdTre
     search_ms_ = 0.0;
 }
 
-void ScanMatcher::look_up(std::size_t i, const NavState& x) {
-    const Eigen::Vector3f& p = (*points_)[i];
-    const Vec3 p_imu = x.extrinsic_rot * p.cast<double>() + x.extrinsic_pos;
+/// Moves a point to the map frame. @returns it in that of the IMU.
+Vec3 ScanMatcher::place(std::size_t i, const NavState& x) {
+    const Vec3 p_imu = x.extrinsic_rot * (*points_)[i].cast<double>() + x.extrinsic_pos;
     in_map_[i] = (x.rot * p_imu + x.pos).cast<float>();
+    return p_imu;
+}
+
+void ScanMatcher::look_up(std::size_t i, const NavState& x) {
+    place(i, x);
     Nearest& near = neighbours_[i];
     near.count = tree_->knn(in_map_[i], Nearest::kMost, kUnbounded, near.items.data());
 }
 
 void ScanMatcher::match(std::size_t i, const NavState& x, bool search) {
     if (!search && verdicts_[i] != Verdict::kAccepted) return;  // out until the next search
-    const Eigen::Vector3f& p = (*points_)[i];
-    const Vec3 p_imu = x.extrinsic_rot * p.cast<double>() + x.extrinsic_pos;
-    in_map_[i] = (x.rot * p_imu + x.pos).cast<float>();
+    const Vec3 p_imu = place(i, x);
     const Nearest& near = neighbours_[i];
     Candidate c{};
     c.index = i;
     c.fresh = search;
     c.imu_range = p_imu.norm();
-    c.lidar_range = static_cast<double>(p.norm());
+    c.lidar_range = static_cast<double>((*points_)[i].norm());
     c.p_map = in_map_[i].data();
     c.neighbours = &near.items[0].x;
     c.sq_distances = &near.items[0].sq_dist;

@@ -29,6 +29,7 @@ class ScanMatcher {
     double search_ms() const { return search_ms_; }
 
   private:
+    Vec3 place(std::size_t i, const NavState& x);
     void look_up(std::size_t i, const NavState& x);
     void match(std::size_t i, const NavState& x, bool search);
     void fill_row(const NavState& x, std::size_t i, Linearisation& out, Eigen::Index row) const;

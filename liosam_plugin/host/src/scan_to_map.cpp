@@ -189,7 +189,7 @@ class ScanToMap::UsedRows {
         const Row& row = rows_[used_[k]];
         return trust(row.residual / row.weight, normal, *patch(k), blind, options_.variance);
     }
-    void replace(std::size_t k, const Vec3& /*normal*/, const CleanedRow& cleaned) {
+    void replace(std::size_t k, const CleanedRow& cleaned, bool /*lost*/) {
         Row& row = rows_[used_[k]];
         const Vec3 kept = row.weight * cleaned.weight * cleaned.normal;
         row.jacobian << row.p.cross(R_.transpose() * kept), kept;

@@ -45,11 +45,13 @@ class ProofTest {
 };
 
 /// A row's normal without its components along the blind directions, as far as those are cleaned.
-inline Vec3 without(const Vec3& normal, const BlindDirections& blind) {
+/// @param share of each component that has proven itself, and stays.
+inline Vec3 without(const Vec3& normal, const BlindDirections& blind,
+                    const Vec3& share = Vec3::Zero()) {
     Vec3 out = normal;
     for (int i = 0; i < blind.count; ++i) {
         const auto d = blind.axes.col(i);
-        out -= blind.blend[i] * normal.dot(d) * d;
+        out -= blind.blend[i] * (1.0 - share[i]) * normal.dot(d) * d;
     }
     return out;
 }

@@ -13,8 +13,8 @@ namespace d2lio {
 ///
 /// `Rows` gives `size()`; `normal(k)`, map frame; `patch(k)`, null where there is none, as of a
 /// line, which cannot prove anything: of its neighbours nothing is known but the line;
-/// `trusted(k, normal, blind)`, see trust(); and `replace(k, normal, cleaned)`, called where
-/// something changes.
+/// `trusted(k, normal, blind)`, see trust(); and `replace(k, cleaned, lost)`, called where
+/// something changes, `lost` telling whether the normal does.
 class RowCleaner {
   public:
     template <typename Rows>
@@ -44,16 +44,17 @@ class RowCleaner {
             }
             const Vec3 kept = without(n, blind);
             if (kept == n) continue;
-            rows.replace(k, n, {kept, 1.0});
+            rows.replace(k, {kept, 1.0}, true);
             ++lost;
         }
         for (const Speaking& row : speaking_) {  // their weight hangs on how many they are
             const Vec3 n = rows.normal(row.index);
             const double trusted = rows.trusted(row.index, n, blind);
             const CleanedRow cleaned = cleaned_row(n, row.share, blind, sum, trusted);
-            if (cleaned.normal == n && cleaned.weight == 1.0) continue;
-            rows.replace(row.index, n, cleaned);
-            if (cleaned.normal != n) ++lost;
+            const bool loses = cleaned.normal != n;
+            if (!loses && cleaned.weight == 1.0) continue;
+            rows.replace(row.index, cleaned, loses);
+            if (loses) ++lost;
         }
         return lost;
     }
