@@ -33,6 +33,7 @@ struct InPlane {
     Upper inverse;  ///< pseudo-inverse, m^-2
     float trace;    ///< m^2
     float height;   ///< n . S n, m^2
+    Vector3f lean;  ///< S n, m^2
 };
 
 /// With B the part of S in the plane: (tr(B) (I - n n^T) - B) / det, det the product of its two
@@ -55,7 +56,8 @@ inline InPlane in_plane(const Upper& S, const Vector3f& n) {
              k * (1.F - y * y) - per_det * yy, -k * y * z - per_det * yz,
              k * (1.F - z * z) - per_det * zz},
             trace,
-            height};
+            height,
+            Sn};
 }
 
 /// With no eigenvalue above kMostVariance; the smallest one, that along the normal, is zero.
@@ -78,44 +80,60 @@ int facing_of(const Vector3f& n) {
     return (quarter(n.x()) * 4 + quarter(n.y())) * 4 + quarter(n.z());
 }
 
-/// Sums over the offsets of the neighbours, h half the squared length of each.
+/// One coordinate of the five neighbours: four in a register of the vector unit, and the fifth.
+struct Five {
+    Eigen::Array4f four;
+    float last;
+
+    static Five read(const float* at, int stride, float from) {
+        const Eigen::Array4f raw(at[0], at[stride], at[2 * stride], at[3 * stride]);
+        return {raw - from, at[4 * stride] - from};
+    }
+    void write(float* to, int stride) const {
+        for (int i = 0; i < 4; ++i) to[i * stride] = four[i];
+        to[4 * stride] = last;
+    }
+    float sum() const { return four.sum() + last; }
+    friend Five operator+(const Five& a, const Five& b) {
+        return {a.four + b.four, a.last + b.last};
+    }
+    friend Five operator-(const Five& a, const Five& b) {
+        return {a.four - b.four, a.last - b.last};
+    }
+    friend Five operator*(const Five& a, const Five& b) {
+        return {a.four * b.four, a.last * b.last};
+    }
+    friend Five operator*(float a, const Five& b) { return {a * b.four, a * b.last}; }
+};
+
+/// Sums over the offsets of the neighbours, h half the squared length of each in the plane.
 struct HalfSquares {
-    float sum = 0.F, squares = 0.F;   ///< of h, h^2
-    float x = 0.F, y = 0.F, z = 0.F;  ///< of h times the offset
+    float sum, squares;  ///< of h, h^2
+    Vector3f moment;     ///< of h times the offset
 };
 
 HalfSquares copy_offsets(const float* xyz, int stride, const Vector3f& n, Patch& patch) {
-    HalfSquares out;
-    const float cx = patch.centroid.x(), cy = patch.centroid.y(), cz = patch.centroid.z();
-    for (int i = 0; i < Patch::kCount; ++i) {
-        const float* const p = xyz + i * stride;
-        float* const o = patch.offsets.data() + 3 * i;
-        const float x = p[0] - cx, y = p[1] - cy, z = p[2] - cz;
-        o[0] = x;
-        o[1] = y;
-        o[2] = z;
-        const float h = n.x() * x + n.y() * y + n.z() * z;
-        const float half = 0.5F * (x * x + y * y + z * z - h * h);
-        out.sum += half;
-        out.squares += half * half;
-        out.x += half * x;
-        out.y += half * y;
-        out.z += half * z;
-    }
-    return out;
+    const Five x = Five::read(xyz, stride, patch.centroid.x()),
+               y = Five::read(xyz + 1, stride, patch.centroid.y()),
+               z = Five::read(xyz + 2, stride, patch.centroid.z());
+    x.write(patch.offsets.data(), 3);
+    y.write(patch.offsets.data() + 1, 3);
+    z.write(patch.offsets.data() + 2, 3);
+    const Five height = n.x() * x + n.y() * y + n.z() * z;
+    const Five h = 0.5F * (x * x + y * y + z * z - height * height);
+    return {h.sum(), (h * h).sum(), {(h * x).sum(), (h * y).sum(), (h * z).sum()}};
 }
 
 /// Regression of the heights on the half squared distances, from which their own plane is taken.
 /// (The rest of a regression is orthogonal to what was taken out, so the heights need not lose
 /// theirs.)
-inline void find_bend(const HalfSquares& h, const Upper& S, const Upper& inverse,
-                      const Vector3f& normal, Patch& patch) {
-    const Vector3f moment(h.x, h.y, h.z);
-    const Vector3f slope = multiply(inverse, moment);
+inline void find_bend(const HalfSquares& h, const InPlane& plane, const Vector3f& normal,
+                      Patch& patch) {
+    const Vector3f slope = multiply(plane.inverse, h.moment);
     patch.sag_mean = h.sum / Patch::kCount;
     patch.sag_slope = slope;
-    patch.bend_rise = patch.side.sign * (moment - multiply(S, slope)).dot(normal);
-    patch.bend_run = std::max(h.squares - h.sum * patch.sag_mean - slope.dot(moment), 0.F);
+    patch.bend_rise = patch.side.sign * (h.moment.dot(normal) - slope.dot(plane.lean));
+    patch.bend_run = std::max(h.squares - h.sum * patch.sag_mean - slope.dot(h.moment), 0.F);
 }
 
 }  // namespace
@@ -176,6 +194,7 @@ void make_patch(const float* xyz, int stride, int count, const PlaneMoments& mom
                 patch.covariance[at] = (i == j ? 1.F : 0.F) - normal[i] * normal[j];
             }
         }
+        patch.least_variance = 1.F;
         return;
     }
     patch.forget_doubt();
@@ -187,9 +206,12 @@ void make_patch(const float* xyz, int stride, int count, const PlaneMoments& mom
     const float bend = 0.5F * kUnknownBend * (plane.trace + 2.F * kMinScatter) / kN;
     patch.variance = std::max(kPointSigma * kPointSigma, plane.height / kFreedom) + bend * bend;
     for (std::size_t i = 0; i < 6; ++i) patch.covariance[i] = patch.variance * plane.inverse[i];
+    // The scatter's largest eigenvalue is not above its trace.
+    patch.least_variance =
+        std::min(patch.variance / (plane.trace + 2.F * kMinScatter), kMostVariance);
     const auto& C = patch.covariance;
     if (C[0] + C[3] + C[5] > kMostVariance) patch.covariance = capped(C);
-    find_bend(halves, moments.scatter, plane.inverse, normal, patch);
+    find_bend(halves, plane, normal, patch);
 }
 
 }  // namespace d2lio

@@ -32,6 +32,9 @@ struct Patch {
     float variance = 0.F;                     ///< of a neighbour's height
     /// Covariance of the unit normal, which lies in the plane: xx, xy, xz, yy, yz, zz; rad^2.
     std::array<float, 6> covariance{};
+    /// No direction in the plane has a smaller formal_variance() (rad^2): a bound, which is
+    /// quicker.
+    float least_variance = 0.F;
     /// Regression of the neighbours' distances from the plane on their squared distances from the
     /// centroid: the bend is bend_rise / bend_run (1/m), its variance sigma^2 / bend_run.
     float bend_rise = 0.F;  ///< m^3
