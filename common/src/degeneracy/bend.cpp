@@ -28,9 +28,11 @@ void BendField::add(const Patch& patch) {
 }
 
 void BendField::end_scan() {
+    any_ = false;
     for (std::size_t i = 0; i < bend_.size(); ++i) {
         const double run = std::max(run_[i], kMinRun);
         bend_[i] = static_cast<float>(shrunk(rise_[i] / run, kPointVariance / run));
+        any_ = any_ || bend_[i] != 0.F;
         rise_[i] *= kKeep;
         run_[i] *= kKeep;
     }

@@ -9,6 +9,7 @@
 #include "d2lio/geometry/so3.hpp"
 #include "d2lio/plugin/core.hpp"
 #include "gate.hpp"
+#include "host_rows.hpp"
 
 namespace d2lio::fastlio {
 namespace {
@@ -45,15 +46,16 @@ struct Adapter::Impl {
     int position_index = 0, rotation_index = 3;
     PriorBlock rows{};
     double variance = 0.0;
-    int scans = 0;                      ///< since the last reset
-    bool rested = false;                ///< one of them
-    bool at_rest = false;               ///< this one
-    std::vector<std::size_t> accepted;  ///< the points behind the rows, in order
+    int scans = 0;         ///< since the last reset
+    bool rested = false;   ///< one of them
+    bool at_rest = false;  ///< this one
+    std::vector<HostRows::Entry> listed;
     RowCleaner cleaner;
     Gate::Look look = Gate::Look::kAll;
 
     bool read(const ScanInput& input, Core& core);
     void copy_rows(const PriorRows& rows);
+    int list_accepted();
     bool settled() const { return rested || scans > kSettlingScans; }
     void clean(const Rows& rows, const Pose& x, double row_variance, Core& core);
     void choose_look(const Core& core);
@@ -137,76 +139,42 @@ void Adapter::Impl::choose_look(const Core& core) {
     look = seeing ? Gate::Look::kSample : Gate::Look::kAll;
 }
 
-/// The host's rows as RowCleaner sees them.
-class HostRows {
-  public:
-    HostRows(const Rows& rows, double variance, const Pose& x, const Gate& gate,
-             const std::vector<std::size_t>& accepted)
-        : rows_(rows),
-          variance_(variance),
-          R_inverse_(x.R.transpose()),
-          t_(x.t),
-          gate_(gate),
-          accepted_(accepted) {}
-
-    std::size_t size() const { return accepted_.size(); }
-    Vec3 normal(std::size_t k) const {
-        const double* const n = entry(k, rows_.position_column);
-        return {n[0], n[rows_.column_step], n[2 * rows_.column_step]};
+/// Lists the accepted points, or of those the ones that speak of a blind direction: the others come
+/// without what they had to lose. @returns how many were accepted.
+int Adapter::Impl::list_accepted() {
+    const std::vector<Verdict>& verdicts = gate.book().verdicts();
+    const bool all = !gate.cleans();
+    listed.clear();
+    int rows = 0;
+    for (std::size_t i = 0; i < verdicts.size(); ++i) {
+        if (verdicts[i] != Verdict::kAccepted) continue;
+        if (all || gate.speaks(i)) listed.push_back({rows, i});
+        ++rows;
     }
-    const Patch* patch(std::size_t k) const { return gate_.patch(accepted_[k]); }
-    double trusted(std::size_t k, const Vec3& normal, const BlindDirections& blind) const {
-        return trust(rows_.residual[k], normal, *patch(k), blind, variance_);
-    }
-
-    void replace(std::size_t k, const CleanedRow& cleaned, bool lost) {
-        const Vec3 arm = gate_.point(accepted_[k]).cast<double>() - t_;
-        const Vec3 kept = cleaned.weight * cleaned.normal;
-        put(k, rows_.position_column, kept);
-        put(k, rows_.rotation_column, R_inverse_ * arm.cross(kept));
-        rows_.residual[k] *= cleaned.weight;
-        if (rows_.extrinsic_column < 0) return;
-        // A row that lost something tells nothing of the extrinsic.
-        const double share = lost ? 0.0 : cleaned.weight;
-        double* const extrinsic = entry(k, rows_.extrinsic_column);
-        for (int c = 0; c < 6; ++c) extrinsic[c * rows_.column_step] *= share;
-    }
-
-  private:
-    double* entry(std::size_t k, int column) const {
-        return rows_.jacobian + static_cast<std::ptrdiff_t>(k) * rows_.row_step +
-               column * rows_.column_step;
-    }
-    void put(std::size_t k, int column, const Vec3& v) {
-        double* const to = entry(k, column);
-        to[0] = v[0];
-        to[rows_.column_step] = v[1];
-        to[2 * rows_.column_step] = v[2];
-    }
-
-    const Rows rows_;
-    const double variance_;
-    const Mat3 R_inverse_;
-    const Vec3 t_;
-    const Gate& gate_;
-    const std::vector<std::size_t>& accepted_;
-};
+    return rows;
+}
 
 /// Takes what noise has put into the rows along blind directions out of them (method noise_aware).
+/// What is blind is found from the scan's first rows that show it; from then on the gate gives
+/// normals that are clean already, all but those of the few rows that speak.
 void Adapter::Impl::clean(const Rows& rows, const Pose& x, double row_variance, Core& core) {
-    accepted.clear();
-    for (std::size_t i = 0; i < gate.book().size(); ++i) {
-        if (gate.book().verdict(i) == Verdict::kAccepted) accepted.push_back(i);
-    }
-    if (static_cast<int>(accepted.size()) != rows.count) return;  // not the rows offered here
-    HostRows host(rows, row_variance, x, gate, accepted);
-    const BlindDirections blind = core.find_blind(cleaner.sums(host));
-    if (look == Gate::Look::kSample && blind.count > 0) {  // by too few patches to act on it
-        core.forget_blind();
+    const bool searched = gate.searched();
+    if (look == Gate::Look::kSample) {
+        if (searched) core.find_blind(gate.sums());
+        core.forget_blind();  // too few patches to act by
         return;
     }
+    const int accepted = list_accepted();
+    if (accepted != rows.count) return;  // not the rows offered here
+    if (searched && !gate.cleans()) core.find_blind(gate.sums());
+    const BlindDirections blind = core.blind_now;
     if (blind.count == 0 || at_rest || !settled()) return;
-    core.current.cleaned = cleaner.clean(blind, core.degeneracy.noise_aware, host);
+    const NoiseAwareConfig& config = core.degeneracy.noise_aware;
+    HostRows host(rows, row_variance, x, gate, listed, blind);
+    if (gate.cleans()) host.scale_extrinsics(0.0);
+    core.current.cleaned = cleaner.clean(blind, config, host);
+    core.current.cleaned += accepted - static_cast<int>(listed.size());
+    gate.clean(blind, config);
 }
 
 Status Adapter::condition(const Rows& rows, const PoseView& pose, double variance,

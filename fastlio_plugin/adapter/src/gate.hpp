@@ -2,9 +2,12 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
+#include <atomic>
+#include <optional>
 #include <vector>
 
 #include "d2lio/degeneracy/bend.hpp"
+#include "d2lio/degeneracy/blind.hpp"
 #include "d2lio/degeneracy/patch.hpp"
 #include "d2lio/fastlio/adapter.hpp"
 #include "d2lio/geometry/plane.hpp"
@@ -28,7 +31,7 @@ class Gate {
     /// How closely the surfaces behind the points are looked at.
     enum class Look {
         kNot,
-        kSample,  ///< every fourth, and those that face where the surface is known to bend
+        kSample,  ///< some, and those that face where the surface is known to bend
         kAll,
     };
 
@@ -42,20 +45,45 @@ class Gate {
     VerdictBook& book() { return book_; }
     /// Of an accepted point; null where none was made.
     const Patch* patch(std::size_t i) const { return has_patch_[i] ? &patches_[i] : nullptr; }
-    const Eigen::Vector3f& point(std::size_t i) const { return points_[i]; }  ///< map frame
+    /// Map frame; only where every surface is looked at.
+    const Eigen::Vector3f& point(std::size_t i) const { return points_[i]; }
+    /// Over the accepted points of the sample, or over all.
+    SurfaceSums sums() const;
+    /// From now on to the scan's end the normals of accepted points come without their components
+    /// along the blind directions, but for those that may have proven themselves.
+    void clean(const BlindDirections& blind, const NoiseAwareConfig& config);
+    bool cleans() const { return test_.has_value(); }
+    /// Whether a point's normal came whole.
+    bool speaks(std::size_t i) const { return told_[i] == Told::kWhole; }
+    /// Whether a point has come with new neighbours since the last call.
+    bool searched() { return searched_.exchange(false); }
 
   private:
     Verdict fit(const Candidate& candidate, const Rejector& rejector);
-    float residual(std::size_t i, const Eigen::Vector3f& p) const;
+    void look_at(const Candidate& candidate, const PlaneMoments& moments);
+    const Eigen::Vector3f& normal(std::size_t i);
+    float sag(std::size_t i, const Eigen::Vector3f& p) const;
+    bool in_sample(std::size_t i) const { return i % step_ == 0; }
 
     VerdictBook book_;
     std::vector<Plane> planes_;
     Look look_ = Look::kNot;
+    std::size_t step_ = 1;      ///< from one point of the sample to the next
+    bool bends_known_ = false;  ///< of any facing
+    std::atomic<bool> searched_{false};
     Eigen::Vector3f sensor_ = Eigen::Vector3f::Zero();
     std::vector<Patch> patches_;
     std::vector<char> has_patch_;  ///< not bool: threads write neighbouring entries
+    /// Of the surfaces from their planes at the points, as of the last search: it changes by less
+    /// than a millimetre within a scan.
+    std::vector<float> sags_;
     std::vector<Eigen::Vector3f> points_;
     BendField bends_;
+
+    enum class Told : char { kUnknown, kCleaned, kWhole };
+    std::optional<ProofTest> test_;
+    std::vector<Told> told_;                ///< of the point's normal
+    std::vector<Eigen::Vector3f> cleaned_;  ///< normals
 };
 
 }  // namespace d2lio::fastlio

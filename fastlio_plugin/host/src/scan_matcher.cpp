@@ -77,7 +77,9 @@ void ScanMatcher::fill_row(const NavState& x, std::size_t i, Linearisation& out,
 }
 
 void ScanMatcher::append_prior(const NavState& x, Linearisation& out) {
-    const Rows rows{out.H.data(), out.residual.data(), static_cast<int>(out.rows), 12, 1, 0, 3, 6};
+    const int extrinsic = extrinsic_est_ ? 6 : -1;
+    const Rows rows{out.H.data(), out.residual.data(), static_cast<int>(out.rows), 12, 1, 0, 3,
+                    extrinsic};
     PriorBlock prior;
     if (adapter_.condition(rows, {x.rot.data(), x.pos.data()}, variance_, &prior) != Status::kOk) {
         return;

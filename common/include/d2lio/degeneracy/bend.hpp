@@ -25,6 +25,7 @@ class BendField {
   public:
     /// Bend of a facing as learnt from earlier scans.
     float at(int facing) const { return bend_[static_cast<std::size_t>(facing)]; }
+    bool any() const { return any_; }  ///< whether at() is not zero everywhere
     void add(const Patch& patch);
     /// How far the surface of a patch lies from its plane at p, along the plane's normal (m).
     /// @param spread of mean_spread(), where the neighbours are means.
@@ -40,6 +41,7 @@ class BendField {
   private:
     std::array<double, kFacings> rise_{}, run_{};
     std::array<float, kFacings> bend_{};
+    bool any_ = false;
 };
 
 }  // namespace d2lio

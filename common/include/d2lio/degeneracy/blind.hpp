@@ -24,22 +24,42 @@ struct BlindDirections {
     Vec3 variance = Vec3::Zero();  ///< of the predicted position along each axis, m^2
 };
 
+/// Components of a row's normal along the blind directions.
+inline Vec3 components(const Vec3& normal, const BlindDirections& blind) {
+    Vec3 out = Vec3::Zero();
+    for (int i = 0; i < blind.count; ++i) out[i] = normal.dot(blind.axes.col(i));
+    return out;
+}
+
 /// Tells at little cost the many rows of which proven_share() is zero.
 class ProofTest {
   public:
     ProofTest(const BlindDirections& blind, const NoiseAwareConfig& config);
-    bool may_pass(const Vec3& normal, const Patch& patch) const {
-        const Eigen::Vector3f n = normal.cast<float>();
+    bool may_pass(const Eigen::Vector3f& normal, const Patch& patch) const {
+        const float bound = least_ * patch.least_variance;
         for (int i = 0; i < count_; ++i) {
             const auto d = axes_.col(i);
-            const float a = n.dot(d);
-            if (a * a > least_ * patch.formal_variance(d)) return true;
+            const float a = normal.dot(d), square = a * a;
+            // Most are told by the bound: of the direction's square 1 - a^2 lies in the plane.
+            if (square <= bound * (1.F - square)) continue;
+            if (square > least_ * patch.formal_variance(d)) return true;
         }
         return false;
     }
 
+    /// The normal without its components along the blind directions, as far as those are cleaned.
+    Eigen::Vector3f without(const Eigen::Vector3f& normal) const {
+        Eigen::Vector3f out = normal;
+        for (int i = 0; i < count_; ++i) {
+            const auto d = axes_.col(i);
+            out -= blend_[i] * normal.dot(d) * d;
+        }
+        return out;
+    }
+
   private:
     Eigen::Matrix3f axes_;
+    Eigen::Vector3f blend_;
     int count_;
     float least_;  ///< ratio of a component's square to its variance
 };
