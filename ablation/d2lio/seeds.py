@@ -5,7 +5,9 @@
 from __future__ import annotations
 
 import argparse
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from rich.console import Console
@@ -37,35 +39,72 @@ class Track:
     covariance: Float64
 
 
-def track(source: Source, host: str, rejection: str | None, method: str | None = METHOD) -> Track:
-    """Runs a host over a recording on one thread; None leaves mode or method to the host.
+def scans(
+    source: Source,
+    host: str,
+    rejection: str | None,
+    method: str | None = METHOD,
+    extra: Mapping[str, str] | None = None,
+) -> Iterator[Any]:
+    """Runs a host over a recording on one thread: the `ScanResult` of every scan with a pose.
 
-    Raises:
-        DataError: no scan gave a pose.
+    Args:
+        source: the recording.
+        host: name of the estimator.
+        rejection: mode; None leaves it to the host.
+        method: for weak directions; None leaves it to the host.
+        extra: other parameters.
     """
-    params = all_params(source.config, host, rejection, method, {})
+    params = all_params(source.config, host, rejection, method, extra or {})
     estimator = load_host(host)(params, 1)
-    poses: list[tuple[int, Float64, Float64]] = []
 
-    def drain() -> None:
+    def ready() -> Iterator[Any]:
         while (result := estimator.step()) is not None:
             if result.has_pose:
-                pose = np.array(result.T_map_imu)
-                poses.append((result.stamp, pose, np.array(result.covariance)))
+                yield result
 
     for event in timed_events(source.reader, log_times=source.log_times):
         if isinstance(event, ImuBlock):
             estimator.add_imu(event.stamps, event.gyro, event.accel, event.orientation)
         else:
             estimator.add_scan(event.stamp, event.xyz, event.dt_ns, event.intensity, event.ring)
-        drain()
+        yield from ready()
     estimator.finish()
-    drain()
-    if not poses:
+    yield from ready()
+
+
+def trajectory_of(results: Sequence[Any]) -> Trajectory:
+    """T_map_imu at the ends of the scans."""
+    poses = np.array([result.T_map_imu for result in results])
+    quaternions = Rotation.from_matrix(poses[:, :3, :3]).as_quat()
+    return Trajectory(np.array([r.stamp for r in results]), poses[:, :3, 3], quaternions)
+
+
+def track(source: Source, host: str, rejection: str | None, method: str | None = METHOD) -> Track:
+    """Runs a host over a recording on one thread; None leaves mode or method to the host.
+
+    Raises:
+        DataError: no scan gave a pose.
+    """
+    results = list(scans(source, host, rejection, method))
+    if not results:
         raise DataError(f"{source.name}: {host} gave no pose")
-    stamps, matrices, covariance = (np.array(column) for column in zip(*poses, strict=True))
-    quaternions = Rotation.from_matrix(matrices[:, :3, :3]).as_quat()
-    return Track(Trajectory(stamps, matrices[:, :3, 3], quaternions), covariance)
+    return Track(trajectory_of(results), np.array([result.covariance for result in results]))
+
+
+def in_map(truth: Trajectory, poses: Trajectory) -> Trajectory:
+    """The truth at the times of the poses, moved so that the first of them agrees with it.
+
+    Raises:
+        DataError: the truth does not cover the estimate.
+    """
+    true = interpolate(truth, poses.stamps, MAX_GAP_S)
+    if len(true) < len(poses):
+        raise DataError("the ground truth does not cover the estimate")
+    rotation = Rotation.from_quat(true.quaternions)
+    to_map = Rotation.from_quat(poses.quaternions[0]) * rotation[0].inv()
+    positions = poses.positions[0] + to_map.apply(true.positions - true.positions[0])
+    return Trajectory(poses.stamps, positions, (to_map * rotation).as_quat())
 
 
 def pose_errors(estimate: Track, truth: Trajectory) -> Float64:
@@ -75,14 +114,9 @@ def pose_errors(estimate: Track, truth: Trajectory) -> Float64:
         DataError: the truth does not cover the estimate.
     """
     poses = estimate.trajectory
-    true = interpolate(truth, poses.stamps, MAX_GAP_S)
-    if len(true) < len(poses):
-        raise DataError("the ground truth does not cover the estimate")
-    rotation, rotation_true = (Rotation.from_quat(p.quaternions) for p in (poses, true))
-    to_map = rotation[0] * rotation_true[0].inv()
-    motion = to_map.apply(true.positions - true.positions[0])
-    turned = rotation * (to_map * rotation_true).inv()
-    return np.hstack([poses.positions - poses.positions[0] - motion, turned.as_rotvec()])
+    true = in_map(truth, poses)
+    turned = Rotation.from_quat(poses.quaternions) * Rotation.from_quat(true.quaternions).inv()
+    return np.hstack([poses.positions - true.positions, turned.as_rotvec()])
 
 
 def built_hosts(

@@ -6,19 +6,23 @@ from __future__ import annotations
 
 import threading
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
 from built import host_params
 from d2lio import runner
 from d2lio.datasets import ImuBlock, open_source, timed_events
+from d2lio.datasets.events import NS_PER_S
 from d2lio.errors import ConfigError
 from d2lio.hosts import describe, load_host
+from d2lio.seeds import scans
 from d2lio.simulator import simulate
 from d2lio.source_params import source_params
 
 # LIO-SAM's own test, eigenvalues below 100 in rad and m mixed, calls one scan in ten degenerate.
 ROOM_OK_SHARE = {"fastlio": 0.95, "liosam": 0.85, "d2lio": 0.95}
+VELOCITY_M_S = 0.25  # LIO-SAM: 0.14; the slope over two scans of a shaken walk is not its velocity
 
 pytestmark = pytest.mark.parametrize("host", host_params())
 
@@ -50,6 +54,28 @@ def test_threads_and_repeats_change_no_byte(
         outputs.append((tmp_path / name / "trajectory.tum").read_bytes())
     assert len(outputs[0].splitlines()) > 15
     assert outputs[0] == outputs[1] == outputs[2]
+
+
+def test_results_hold_the_state_and_what_the_match_changed(host: str, room: Path) -> None:
+    """Velocity is near the path's slope, and position is the predicted one plus the correction."""
+    results = list(scans(open_source(room), host, "point_adaptive", "none"))
+    for result in results:
+        for name in ("velocity", "gyro_bias", "accel_bias", "gravity", "correction"):
+            assert np.shape(getattr(result, name)) == (3,)
+    matched = [r for r in results if r.diagnostics["accepted"] > 0]
+    assert len(matched) > 20
+    for result in matched:
+        assert np.linalg.norm(result.correction) == pytest.approx(
+            result.diagnostics["correction_t"], abs=1e-12
+        )
+    stamps, path = (np.array([f(r) for r in results]) for f in (lambda r: r.stamp, position))
+    slope = np.gradient(path, stamps / NS_PER_S, axis=0)
+    velocity = np.array([r.velocity for r in results])
+    assert np.median(np.linalg.norm(velocity - slope, axis=1)) < VELOCITY_M_S
+
+
+def position(result: Any) -> np.ndarray:
+    return np.array(result.T_map_imu)[:3, 3]
 
 
 def test_describe_names_every_parameter(host: str) -> None:

@@ -184,16 +184,22 @@ void bind_result(nb::module_& m) {
             nb::rv_policy::automatic, "float64 [4, 4], m")
         .def_prop_ro(
             "velocity", [](const Result& r) { return to_numpy(r.state.vel); },
-            nb::rv_policy::automatic, "map frame, m/s")
+            nb::rv_policy::automatic, "float64 [3], map frame, m/s")
         .def_prop_ro(
             "gyro_bias", [](const Result& r) { return to_numpy(r.state.gyro_bias); },
-            nb::rv_policy::automatic, "rad/s")
+            nb::rv_policy::automatic, "float64 [3], body, rad/s")
         .def_prop_ro(
             "accel_bias", [](const Result& r) { return to_numpy(r.state.accel_bias); },
-            nb::rv_policy::automatic, "m/s^2")
+            nb::rv_policy::automatic, "float64 [3], body, m/s^2")
         .def_prop_ro(
             "gravity", [](const Result& r) { return to_numpy(r.state.gravity); },
-            nb::rv_policy::automatic, "map frame, m/s^2")
+            nb::rv_policy::automatic, "float64 [3], map frame, m/s^2")
+        .def_prop_ro(
+            "correction", [](const Result& r) { return to_numpy(r.diagnostics.correction); },
+            nb::rv_policy::automatic,
+            "float64 [3], position after the match minus the predicted one, map frame, m; NaN "
+            "where "
+            "nothing was matched")
         .def_prop_ro(
             "covariance", [](const Result& r) { return to_numpy(r.covariance); },
             nb::rv_policy::automatic, "float64 [6, 6], x y z rx ry rz, map frame, m^2 and rad^2")

@@ -365,6 +365,7 @@ TEST(Adapter, DiagnosticsNameTheWeakDirection) {
     EXPECT_EQ(d.weak_t, 1);
     EXPECT_GT(d.v_t(0, 0), 0.999);
     EXPECT_NEAR(d.correction_weak_t, 0.3, 0.01);
+    EXPECT_EQ(d.correction, posterior.t);
     std::map<std::string, double> columns;
     for (std::size_t i = 0; i < a.diagnostics_size(); ++i) {
         columns[a.diagnostics_name(i)] = a.diagnostics_value(i);

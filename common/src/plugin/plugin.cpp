@@ -81,6 +81,7 @@ void Plugin::Core::keep_corrections(const Pose& posterior) {
         for (int i = 0; i < count; ++i) sum += std::pow(v.col(i).dot(d), 2);
         return std::sqrt(sum);
     };
+    current.correction = dt;
     current.correction_r = dr.norm();
     current.correction_t = dt.norm();
     if (!current.v_t.allFinite()) return;  // no rows this scan

@@ -63,6 +63,7 @@ struct ScanDiagnostics {
     int weak_r = 0, weak_t = 0;  ///< number of weak directions (the first columns)
     double correction_r = kNaN, correction_t = kNaN;  ///< |posterior - prediction|, rad and m
     double correction_weak_r = kNaN, correction_weak_t = kNaN;  ///< its part along weak directions
+    Vec3 correction = Vec3::Constant(kNaN);  ///< posterior - prediction, map frame, m; no column
     int iterations = 0;
     bool converged = false;
 
