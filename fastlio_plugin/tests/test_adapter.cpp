@@ -320,10 +320,65 @@ TEST(Adapter, RemapTakesTheWeakDirectionOutOfTheRows) {
     PriorBlock prior{};
     a.begin_scan(Scene().input());
     a.condition(view(H, r), Scene().view(), kVariance, &prior);
-    EXPECT_EQ(prior.count, 0);
+    EXPECT_EQ(prior.count, 1);  // which holds it
     const Eigen::SelfAdjointEigenSolver<Mat3> left(H.leftCols<3>().transpose() * H.leftCols<3>());
     EXPECT_LT(left.eigenvalues()[0], kExact);
     EXPECT_GT(left.eigenvalues()[1], 50.0);
+}
+
+/// The step of the filter with the rows H | r and those of the prior.
+Vec3 position_step(const Scene& s, const RowMatrix& H, const Eigen::VectorXd& r,
+                   const PriorBlock& prior) {
+    Mat23x23 information = kVariance * s.P.inverse();
+    Eigen::Matrix<double, 23, 1> Htr = Eigen::Matrix<double, 23, 1>::Zero();
+    information.topLeftCorner<12, 12>() += H.transpose() * H;
+    Htr.head<12>() = H.transpose() * r;
+    for (int i = 0; i < prior.count; ++i) {
+        const Eigen::Map<const Vec6> h(prior.jacobian[i]);
+        information.topLeftCorner<6, 6>() += h * h.transpose();
+        Htr.head<6>() += h * prior.residual[i];
+    }
+    return information.ldlt().solve(Htr).head<3>();
+}
+
+/// Taking a direction out of the rows is not enough where P couples it with what they see.
+TEST(Adapter, WhatIsHeldKeepsThePredictionWhateverPCouplesItWith) {
+    const std::map<std::string, std::map<std::string, std::string>> methods{
+        {"remap", {{"degeneracy.threshold_r", "0"}}},
+        {"tsvd", {}},
+        {"xicp", {{"degeneracy.kappa_2", "40"}, {"degeneracy.kappa_3", "40"}}}};
+    for (const auto& [method, params] : methods) {
+        Adapter a;
+        ASSERT_TRUE(a.set("degeneracy.method", method.c_str()));
+        for (const auto& [key, value] : params) ASSERT_TRUE(a.set(key.c_str(), value.c_str()));
+        test::Random random(6);
+        Scene s;
+        s.P = random.covariance();
+        a.begin_scan(s.input());
+        RowMatrix H = weak_rows(random, 300);
+        Eigen::VectorXd r = 0.1 * H.col(1) + 0.05 * H.col(2);  // the scan has moved across
+        const Vec3 weakest =
+            Eigen::SelfAdjointEigenSolver<Mat3>(H.leftCols<3>().transpose() * H.leftCols<3>())
+                .eigenvectors()
+                .col(0);
+        PriorBlock prior{};
+        ASSERT_EQ(a.condition(view(H, r), s.view(), kVariance, &prior), Status::kOk);
+        EXPECT_EQ(prior.count, 1) << method;
+        const Vec3 free = position_step(s, H, r, PriorBlock{});
+        const Vec3 held = position_step(s, H, r, prior);
+        EXPECT_GT(std::abs(weakest.dot(free)), 0.01) << method;
+        EXPECT_LT(std::abs(weakest.dot(held)), 1e-5) << method;
+        EXPECT_NEAR(held.y(), 0.1, 0.01) << method;
+        EXPECT_NEAR(held.z(), 0.05, 0.01) << method;
+        Eigen::MatrixXd Hx = Eigen::MatrixXd::Zero(301, 23);
+        Hx.topLeftCorner<300, 12>() = H;
+        const Mat23x23 without =
+            Mat23x23(s.P.inverse() + Hx.transpose() * Hx / kVariance).inverse();
+        for (int j = 0; j < 6; ++j) Hx(300, j) = prior.jacobian[0][j];
+        Mat23x23 P = Mat23x23(s.P.inverse() + Hx.transpose() * Hx / kVariance).inverse();
+        EXPECT_EQ(a.end_scan(s.view(), true, P.data(), 23), Status::kOk);
+        EXPECT_LT((P - without).norm(), 1e-6 * without.norm()) << method;
+    }
 }
 
 TEST(Adapter, TheKeptCovarianceDoesNotClaimThePrior) {

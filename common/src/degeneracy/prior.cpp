@@ -10,6 +10,9 @@
 namespace d2lio {
 namespace {
 
+/// Share of a weight's largest eigenvalue below which another one is zero.
+constexpr double kRounding = 1e-14;
+
 std::variant<NoPrior, PaperPrior, RemapPrior, TruncatedPrior, XIcpPrior> make_policy(
     const DegeneracyConfig& c) {
     switch (c.method) {
@@ -99,7 +102,7 @@ PriorRows make_prior_rows(const PriorTerm& prior, const Vec3& e_r, const Vec3& e
         const BlockSpectrum s = decompose(W);
         for (int i = 0; i < 3; ++i) {
             const double root = std::sqrt(variance * s.lambda[i]);
-            if (!(root > 0.0) || !std::isfinite(root)) continue;
+            if (!(s.lambda[i] > kRounding * s.lambda[2]) || !std::isfinite(root)) continue;
             block.row(rows.count) = root * s.v.col(i).transpose() * J;
             rows.residual[rows.count] = -root * s.v.col(i).dot(e);
             ++rows.count;

@@ -4,6 +4,7 @@
 
 #include <Eigen/Cholesky>
 #include <Eigen/Geometry>
+#include <Eigen/LU>
 
 #include "d2lio/degeneracy/clean_rows.hpp"
 #include "d2lio/geometry/so3.hpp"
@@ -38,6 +39,26 @@ Mat3 gram(const StridedRows& A) {
 /// A filter that did not begin at rest knows its velocity from the scans alone: it gets all of them
 /// while it learns it.
 constexpr int kSettlingScans = 20;
+
+/// How many times its own information the prediction gets along a direction that a policy holds.
+/// More would hold no better, and what is left of S in remove_prior() would be rounding.
+constexpr double kHold = 1e6;
+
+/// kHold (V^T P V)^-1 on the directions V that `keep` takes out.
+Mat3 held(const Mat3& keep, const Mat3& P) {
+    const Mat3 drop = Mat3::Identity() - keep;
+    if (drop.trace() < 0.5) return Mat3::Zero();  // a projector's trace is a whole number
+    return kHold * drop * (drop * P * drop + keep).inverse() * drop;
+}
+
+/// Pins the directions a policy takes from the scan to the prediction. Rows without them are not
+/// enough in a filter: P couples position and attitude with each other and with what the rows see,
+/// and the directions of one scan lie a degree beside those of the last.
+void hold(const Mat3& P_r, const Mat3& P_t, PriorTerm& term) {
+    term.W_r = held(term.keep_r, P_r);
+    term.W_t = held(term.keep_t, P_t);
+    term.adds_prior = true;
+}
 
 }  // namespace
 
@@ -189,10 +210,11 @@ Status Adapter::condition(const Rows& rows, const PoseView& pose, double varianc
     core().current.cleaned = 0;
     if (core().degeneracy.cleans_rows() && is_finite(x)) m.clean(rows, x, variance, core());
     const RowView view{view_of(rows, rows.rotation_column), view_of(rows, rows.position_column)};
-    const PriorTerm term = core().analyse(gram(A_r), gram(A_t), &view);
+    PriorTerm term = core().analyse(gram(A_r), gram(A_t), &view);
     if (term.projects) {
         A_t *= term.keep_t;
         A_r *= term.keep_r;
+        hold(core().P_r, core().P_t, term);
     }
     if (!term.adds_prior || !is_finite(x)) return Status::kOk;
     const Vec3 e_r = log_so3(core().predicted.R.transpose() * x.R);

@@ -45,7 +45,8 @@ struct PaperPrior {
 
 /// Solution remapping: directions with an eigenvalue below the threshold keep the prediction
 /// (Zhang, Kaess, Singh, "On degeneracy of optimization-based state estimation problems", 2016). In
-/// a filter the scan's rows lose their component along such a direction.
+/// a filter the scan's rows lose their component along such a direction, and the prediction is
+/// held there.
 struct RemapPrior {
     double threshold_r = 100.0;  ///< m^2
     double threshold_t = 100.0;  ///< points
