@@ -156,7 +156,7 @@ void scan_to_map(benchmark::State& state, Preset preset, const ParamMap& params)
     ParamTable none;
     configure(adapter_defaults(preset), none, adapter);
     configure(params, none, adapter);
-    finish_configuration(adapter, keys.config.surface_leaf);
+    finish_configuration(adapter, keys.config.map_leaf());
     ScanToMap matcher(adapter, keys.config.matching, 1);
     const Pose previous = Street::pose_at((kSubmap - 1) * kSpacing);
     Samples samples;

@@ -14,9 +14,6 @@ using I = StateIndex;
 
 /// Of a body at rest where the map begins: m^2, rad^2.
 constexpr double kKnownPosition = 1e-6, kKnownRotation = 1e-8;
-/// Variance of the map by that of a scan's row: its points have the noise of the scans they came
-/// from, five of them are shared by many rows, and a voxel keeps one.
-constexpr double kMapNoise = 3.0;
 /// No scan is straighter than this: angles of the beams, and which points of a surface it sampled.
 constexpr double kStraightness = 0.5e-3;  ///< rad
 /// A direction that the scan sees to no better than this has the prediction's error, not the
@@ -104,7 +101,7 @@ void PoseUncertainty::predict(const NavState& from, const NavState& to,
 void PoseUncertainty::update(const NavState& x, const Match& match) {
     const Mat6 J = map_from_body(x.rot);
     const double misfit = std::max(match.misfit, 1.0);
-    scan_noise_ = kMapNoise * J * noise_of_scan(match.information / misfit) * J.transpose();
+    scan_noise_ = map_noise_ * J * noise_of_scan(match.information / misfit) * J.transpose();
     scan_noise_.diagonal().tail<3>().array() += kStraightness * kStraightness;
     if (!matched_) C_.bottomRightCorner<6, 6>() += scan_noise_;  // of the map's first scan
     matched_ = true;

@@ -12,25 +12,36 @@ void Linearisation::reserve(Eigen::Index n) {
     residual.conservativeResize(n);
 }
 
+/// The rows' normal equations, with what all rows have in common.
+void Ieskf::limit(Mat12& HtH, Vec12& Htr) const {
+    const ScanError& e = rows_.error;
+    if (e.rotation == 0.0 && e.position == 0.0) return;
+    Vec12 variances = Vec12::Zero();
+    variances.segment<3>(StateIndex::kPos).setConstant(e.position);
+    variances.segment<3>(StateIndex::kRot).setConstant(e.rotation);
+    limit_information<12>(variances / options_.variance, HtH, Htr);
+}
+
 /// K = (H^T H + (P / r)^-1)^-1 H^T: fewer states than rows.
 bool Ieskf::tall_gain(const Mat23x23& P) {
     const Eigen::LLT<Mat23x23> prior(P / options_.variance);
     if (prior.info() != Eigen::Success) return false;
     const auto H = rows_.H.topRows(rows_.rows);
     Mat12 HtH = Mat12::Zero();
-    Eigen::Matrix<double, 12, 1> Htr = Eigen::Matrix<double, 12, 1>::Zero();
+    Vec12 Htr = Vec12::Zero();
     for (Eigen::Index i = 0; i < rows_.rows; ++i) {  // in order: the sum repeats bit for bit
         const Eigen::Matrix<double, 12, 1> h = H.row(i);
         HtH.noalias() += h * h.transpose();
         Htr.noalias() += h * rows_.residual[i];
     }
+    HtH_ = HtH;
+    limit(HtH, Htr);
     Mat23x23 information = prior.solve(Mat23x23::Identity());
     information.topLeftCorner<12, 12>() += HtH;
     const Eigen::LLT<Mat23x23> posterior(0.5 * (information + information.transpose()));
     if (posterior.info() != Eigen::Success) return false;
     Eigen::Matrix<double, 23, 13> rhs = Eigen::Matrix<double, 23, 13>::Zero();
     rhs.topLeftCorner<12, 12>() = HtH;
-    HtH_ = HtH;
     rhs.block<12, 1>(0, 12) = Htr;
     const Eigen::Matrix<double, 23, 13> solved = posterior.solve(rhs);
     KH_ = solved.leftCols<12>();

@@ -4,6 +4,7 @@
 
 #include <functional>
 
+#include "d2lio/degeneracy/scan_error.hpp"
 #include "d2lio/geometry/state.hpp"
 #include "d2lio/host/pose_uncertainty.hpp"
 
@@ -15,6 +16,7 @@ struct Linearisation {
     Eigen::Matrix<double, Eigen::Dynamic, 12, Eigen::RowMajor> H;
     Eigen::VectorXd residual;  ///< minus the measurement error, z - h(x)
     Eigen::Index rows = 0;     ///< rows in use; the storage only grows
+    ScanError error;           ///< common to all rows
 
     void reserve(Eigen::Index n);
 };
@@ -42,6 +44,8 @@ struct UpdateReport {
     bool converged = false;
 };
 
+using Vec12 = Eigen::Matrix<double, 12, 1>;
+
 /// Iterated error-state Kalman update on the 23-DoF manifold (FAST-LIO2, section IV-C; He, Xu,
 /// Zhang 2021). `x` and `P` hold the prediction on entry and the posterior on return.
 class Ieskf {
@@ -58,12 +62,13 @@ class Ieskf {
                    Mat23x23& out) const;
     /// One Gauss-Newton step from x; false when a matrix is singular or the step not finite.
     bool step(const Mat23x23& P, const Vec23& deviation, Vec23& dx);
+    void limit(Mat12& HtH, Vec12& Htr) const;
     bool wide_gain(const Mat23x23& P);
     bool tall_gain(const Mat23x23& P);
 
     IeskfOptions options_;
     Linearisation rows_;
-    Mat12 HtH_ = Mat12::Zero();  ///< of the last step
+    Mat12 HtH_ = Mat12::Zero();  ///< of the rows of the last step
     Vec23 Kr_ = Vec23::Zero();   ///< K residual
     Eigen::Matrix<double, 23, 12> KH_ = Eigen::Matrix<double, 23, 12>::Zero();  ///< first columns
 };

@@ -81,9 +81,11 @@ void ScanMatcher::append_prior(const NavState& x, Linearisation& out) {
     const Rows rows{out.H.data(), out.residual.data(), static_cast<int>(out.rows), 12, 1, 0, 3,
                     extrinsic};
     PriorBlock prior;
+    out.error = ScanError{};
     if (adapter_.condition(rows, {x.rot.data(), x.pos.data()}, variance_, &prior) != Status::kOk) {
         return;
     }
+    out.error = adapter_.scan_error();
     for (int i = 0; i < prior.count; ++i) {
         for (int j = 0; j < 6; ++j) out.H(out.rows, j) = prior.jacobian[i][j];
         out.H.block<1, 6>(out.rows, 6).setZero();

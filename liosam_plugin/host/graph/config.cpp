@@ -50,6 +50,7 @@ void HostConfig::bind(ParamTable& t) {
     t.add("mappingCornerLeafSize", corner_leaf, kLeaf, "m", "voxel of corners, scan and map");
     t.add("mappingSurfLeafSize", surface_leaf, kLeaf, "m", "voxel of surfaces, scan and map");
     t.add("direct.leaf", direct_leaf, kLeaf, "m", "voxel of the scan, front end direct");
+    t.add("direct.map_leaf", direct_map_leaf, kLeaf, "m", "voxel of the map, front end direct");
     t.add("direct.kernel_scale", kernel_scale, {1e-3, 100.0}, "m",
           "distance at which a point's weight is halved (Cauchy kernel), front end direct");
     t.add("mapping.max_iterations", matching.max_iterations, {1, 1000}, "",
@@ -124,14 +125,14 @@ FeatureOptions HostConfig::feature_options() const {
 SubmapOptions HostConfig::submap_options() const {
     SubmapOptions o = submap;
     o.corner_leaf = static_cast<float>(corner_leaf);
-    o.surface_leaf = static_cast<float>(surface_leaf);
+    o.surface_leaf = static_cast<float>(map_leaf());
     o.max_clouds = static_cast<std::size_t>(max_clouds);
     return o;
 }
 
 MatchOptions HostConfig::match_options() const {
     MatchOptions o = matching;
-    o.map_leaf = surface_leaf;
+    o.map_leaf = map_leaf();
     if (front_end == FrontEnd::kFeatures) return o;
     o.kernel_scale = kernel_scale;
     o.min_spread_ratio = PlaneFitOptions{}.min_spread_ratio;

@@ -40,6 +40,7 @@ struct HostConfig {
     double corner_leaf = 0.2, surface_leaf = 0.4;          ///< m, voxels of scan and submap
     int max_clouds = 1500;                                 ///< keyframe clouds kept
     double direct_leaf = 0.3;                  ///< m, voxel of the scan, front end direct
+    double direct_map_leaf = 0.25;             ///< m, voxel of the submap, front end direct
     double kernel_scale = 0.1;                 ///< m, front end direct
     int min_corners = 10, min_surfaces = 100;  ///< features that matching needs
     double mapping_interval = 0.15;            ///< s
@@ -51,6 +52,11 @@ struct HostConfig {
 
     void bind(ParamTable& table);
     void validate() const;
+    /// Voxels of surfaces with the front end that is chosen, m.
+    double scan_leaf() const { return front_end == FrontEnd::kDirect ? direct_leaf : surface_leaf; }
+    double map_leaf() const {
+        return front_end == FrontEnd::kDirect ? direct_map_leaf : surface_leaf;
+    }
     FeatureOptions feature_options() const;
     SubmapOptions submap_options() const;
     MatchOptions match_options() const;

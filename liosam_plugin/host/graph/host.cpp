@@ -20,7 +20,7 @@ HostConfig load(Preset preset, const ParamMap& params, int threads, Adapter& ada
     configure(params, table, adapter);
     config.threads = threads;
     config.validate();
-    finish_configuration(adapter, config.surface_leaf);
+    finish_configuration(adapter, config.map_leaf());
     return config;
 }
 

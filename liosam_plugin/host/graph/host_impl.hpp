@@ -60,10 +60,6 @@ class Host::Impl {
     void start_anew(const std::string& why, ScanResult& r);
     void finish(ScanResult& r) const;
 
-    double surface_leaf() const {
-        return config_.front_end == FrontEnd::kDirect ? config_.direct_leaf : config_.surface_leaf;
-    }
-
     MatchCloud cloud_;
     std::vector<LidarPoint> raw_;
     RestCloud rest_corners_, rest_surfaces_;  ///< IMU frame

@@ -39,7 +39,7 @@ Pose Host::Impl::match(ScanResult& r) {
         if (const std::optional<Mat3> world = predictor_.orientation()) {
             estimate.R = blend_tilt(estimate.R, *world, config_.rpy_weight);
         }
-        covariance_ = pose_covariance(P, report_.information, config_.matching.variance);
+        covariance_ = pose_covariance(P, report_.limited, config_.matching.variance);
         matched_covariance_ = covariance_;
     } else {
         estimate = predicted;
@@ -98,8 +98,9 @@ void Host::Impl::fuse(const Pose& estimate, ScanResult& r) {
     const bool held = predictor_.hold(estimate, matched(), r.diagnostics);
     if (!held && matched()) {
         const double variance = config_.matching.variance;
-        predictor_.fuse(estimate, covariance_, report_.information / variance,
-                        report_.mean_square / variance);
+        predictor_.fuse(estimate, covariance_,
+                        {report_.information / variance, report_.limited / variance,
+                         report_.mean_square / variance});
     }
     previous_ = predictor_.state().T_map_imu();
     covariance_ = predictor_.covariance();
@@ -118,7 +119,7 @@ void Host::Impl::collect_rest(const MeasureGroup& group, ScanResult& r) {
     if (!rest.held() || !rest_surfaces_.grown() || map_.size() != 1) return;
     map_.clear();
     map_.add(rest.pose(), group.end, rest_corners_.mean(config_.corner_leaf),
-             rest_surfaces_.mean(surface_leaf()));
+             rest_surfaces_.mean(config_.scan_leaf()));
     r.times.map = watch_.lap();
 }
 

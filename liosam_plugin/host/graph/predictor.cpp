@@ -90,8 +90,7 @@ bool Predictor::hold(const Pose& estimate, bool matched, const ScanDiagnostics& 
 
 /// With the pose's error a and the others' b, jointly normal: b follows by P_ba P_aa^-1 a, and its
 /// covariance shrinks as far as that of the pose does.
-void Predictor::fuse(const Pose& T, const Mat6& covariance, const Mat6& information,
-                     double misfit) {
+void Predictor::fuse(const Pose& T, const Mat6& covariance, const ScanSays& scan) {
     using Mat23x6 = Eigen::Matrix<double, 23, 6>;
     const Mat6 prior = this->covariance();
     const Eigen::LLT<Mat6> llt(prior);
@@ -116,9 +115,9 @@ void Predictor::fuse(const Pose& T, const Mat6& covariance, const Mat6& informat
     match.gain.leftCols<6>() =
         gain * (Mat6::Identity() - llt.solve(covariance).transpose()) * order;
     const Mat23x6 spread = gain * covariance;
-    match.noise = spread * information * spread.transpose();
-    match.information = order * information * order;
-    match.misfit = misfit;
+    match.noise = spread * scan.limited * spread.transpose();
+    match.information = order * scan.information * order;
+    match.misfit = scan.misfit;
     uncertainty_.update(x_, match);
 }
 

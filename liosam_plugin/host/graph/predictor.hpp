@@ -13,6 +13,13 @@
 
 namespace d2lio::liosam {
 
+/// What the rows of one scan say of the pose: rotation (body), position (map); rad^-2, m^-2.
+struct ScanSays {
+    Mat6 information = Mat6::Zero();
+    Mat6 limited = Mat6::Zero();  ///< as it was used; see ScanError
+    double misfit = 1.0;          ///< see PoseUncertainty::Match
+};
+
 /// Forward propagation from the last corrected state to the end of a scan: the initial guess, its
 /// covariance relative to the last matched estimate, and the motion for de-skewing.
 class Predictor {
@@ -37,10 +44,7 @@ class Predictor {
     /// Takes over an estimate that contains the prediction (method noise_aware): velocity, biases
     /// and gravity follow by what they share with the pose, as in a Kalman filter.
     /// @param covariance of the estimate, absolute in the map; rotation (body), position (map).
-    /// @param information of the scan's own rows, same order. @param misfit as
-    /// PoseUncertainty::Match::misfit.
-    void fuse(const Pose& T_map_imu, const Mat6& covariance, const Mat6& information,
-              double misfit);
+    void fuse(const Pose& T_map_imu, const Mat6& covariance, const ScanSays& scan);
     /// See PoseUncertainty; empty unless start_filter() was called.
     PoseUncertainty& uncertainty() { return uncertainty_; }
     const PoseUncertainty& uncertainty() const { return uncertainty_; }
@@ -85,7 +89,7 @@ class Predictor {
     std::vector<MotionKnot> knots_;
     std::vector<ImuStep> steps_;
     RestStart rest_;
-    PoseUncertainty uncertainty_;
+    PoseUncertainty uncertainty_{PoseUncertainty::kMeans};
     double accel_scale_ = 1.0;  ///< readings to m/s^2
 };
 

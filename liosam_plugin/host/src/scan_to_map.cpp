@@ -8,6 +8,7 @@
 #include <cmath>
 #include <limits>
 
+#include "d2lio/degeneracy/scan_error.hpp"
 #include "d2lio/geometry/plane.hpp"
 #include "d2lio/geometry/so3.hpp"
 #include "d2lio/host/stop_watch.hpp"
@@ -215,6 +216,14 @@ void ScanToMap::clean(const Pose& T) {
     adapter_.note_cleaned(cleaner_.clean(blind, adapter_.noise_aware(), rows));
 }
 
+/// Where the guess is an estimate of its own, the scan's own error as a rigid body matters.
+void ScanToMap::limit(Mat6& AtA, Vec6& Atb) const {
+    const ScanError error = adapter_.scan_error();
+    Vec6 variances;
+    variances << Vec3::Constant(error.rotation), Vec3::Constant(error.position);
+    limit_information<6>(variances / options_.variance, AtA, Atb);
+}
+
 /// Adds information W of the guess: the cost |e|^2_W, e = (Log(R_guess^T R), t - t_guess), in units
 /// of the rows' variance.
 void ScanToMap::add_prior(const Pose& T, Mat6& AtA, Vec6& Atb) const {
@@ -266,6 +275,8 @@ bool ScanToMap::step(const MatchInput& input, Pose& T, MatchReport& report) {
     const RowView rows = adapter_.counts_rows() ? view_rows() : RowView{};
     adapter_.condition_tangent({T.R.data(), T.t.data()}, options_.variance,
                                {AtA.data(), Atb.data(), adapter_.counts_rows() ? &rows : nullptr});
+    if (prior_ != nullptr) limit(AtA, Atb);
+    report.limited = AtA;
     if (prior_ != nullptr) add_prior(T, AtA, Atb);
     report.degenerate = adapter_.degenerate() || report.remapped;
     const Vec6 whole = AtA.ldlt().solve(Atb);

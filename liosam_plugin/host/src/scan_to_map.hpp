@@ -42,7 +42,8 @@ struct MatchReport {
     bool degenerate = false;  ///< some direction is weak, judged on the scan's own rows
     bool remapped = false;    ///< the host's own remapping held back some direction
     Mat6 information =
-        Mat6::Zero();          ///< A^T A of the scan's rows at the last iterate; tangent order
+        Mat6::Zero();  ///< A^T A of the scan's rows at the last iterate; tangent order
+    Mat6 limited = Mat6::Zero();  ///< the same as the estimate took it; see ScanError
     double mean_square = 0.0;  ///< of the rows' residuals at the last iterate, m^2 (noise_aware)
     double search_ms = 0.0;
 };
@@ -110,6 +111,7 @@ class ScanToMap {
     RowView view_rows();
     double mean_square() const;
     void clean(const Pose& T);
+    void limit(Mat6& AtA, Vec6& Atb) const;
     void add_prior(const Pose& T, Mat6& AtA, Vec6& Atb) const;
     void learn_bends();
 

@@ -13,6 +13,7 @@ inline ParamMap indoor(ParamMap extra = {}) {
                                    {"mappingSurfLeafSize", "0.2"},
                                    {"odometrySurfLeafSize", "0.2"},
                                    {"direct.leaf", "0.2"},
+                                   {"direct.map_leaf", "0.2"},
                                    {"Horizon_SCAN", "180"},
                                    {"edgeFeatureMinValidNum", "4"}});
     for (auto& [key, value] : extra) params[key] = value;

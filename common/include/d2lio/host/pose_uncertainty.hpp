@@ -23,6 +23,12 @@ namespace d2lio {
 /// ends, as by clear().
 class PoseUncertainty {
   public:
+    /// Variance of the map by that of a scan's row: its points have the noise of the scans they
+    /// came from, and five of them are shared by many rows. A voxel that keeps one point has three
+    /// times the variance of one that keeps a mean; found by the NEES of a room.
+    static constexpr double kPoints = 3.0, kMeans = 1.0;
+    explicit PoseUncertainty(double map_noise = kPoints) : map_noise_(map_noise) {}
+
     /// How a match moved the state.
     struct Match {
         /// K H: of its 23 columns the first 12, the others are zero.
@@ -53,7 +59,7 @@ class PoseUncertainty {
     Mat6 covariance(const NavState& x) const;
 
     bool begun() const { return begun_; }
-    void clear() { *this = PoseUncertainty(); }
+    void clear() { *this = PoseUncertainty(map_noise_); }
 
   private:
     /// The filter's error, then that of the map: position, rotation, both in the map frame.
@@ -66,6 +72,7 @@ class PoseUncertainty {
 
     Joint C_ = Joint::Zero();
     Mat6 scan_noise_ = Mat6::Zero();  ///< of the last scan as a rigid body, map frame
+    double map_noise_;
     bool begun_ = false;
     bool matched_ = false;  ///< since the map began
 };

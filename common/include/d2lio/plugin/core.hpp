@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "d2lio/degeneracy/prior.hpp"
+#include "d2lio/degeneracy/scan_error.hpp"
 #include "d2lio/diagnostics/scan_diagnostics.hpp"
 #include "d2lio/plugin/plugin.hpp"
 #include "d2lio/rejection/rejector.hpp"

@@ -12,6 +12,7 @@ namespace d2lio {
 
 struct ScanDiagnostics;
 struct NoiseAwareConfig;
+struct ScanError;
 struct BlindDirections;
 class SurfaceSums;
 
@@ -85,6 +86,8 @@ class Plugin {
     /// what the sums over the rows say; `cleaned` rows go on record.
     const NoiseAwareConfig& noise_aware() const;
     BlindDirections find_blind(const SurfaceSums& sums);
+    /// Of the scan being matched; nothing with another method.
+    ScanError scan_error() const;
     void note_cleaned(int rows);
 
   protected:

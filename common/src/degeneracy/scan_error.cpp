@@ -1,0 +1,18 @@
+// SPDX-FileCopyrightText: 2026 D2-LIO contributors
+// SPDX-License-Identifier: BSD-3-Clause
+#include "d2lio/degeneracy/scan_error.hpp"
+
+namespace d2lio {
+namespace {
+
+constexpr double kRotation = 0.5e-3;  ///< rad
+constexpr double kPosition = 5e-3;    ///< m, where a direction is blind
+
+}  // namespace
+
+ScanError scan_error(const BlindDirections& blind) {
+    const double most = blind.count > 0 ? blind.blend.head(blind.count).maxCoeff() : 0.0;
+    return {kRotation * kRotation, most * kPosition * kPosition};
+}
+
+}  // namespace d2lio
