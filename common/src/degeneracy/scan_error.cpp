@@ -5,14 +5,16 @@
 namespace d2lio {
 namespace {
 
-constexpr double kRotation = 0.5e-3;  ///< rad
-constexpr double kPosition = 5e-3;    ///< m, where a direction is blind
+constexpr double kRotation = 0.5e-3;  ///< rad, at a misfit of 1
+constexpr double kMostMisfit = 4.0;
+constexpr double kPosition = 5e-3;  ///< m, where a direction is blind
 
 }  // namespace
 
-ScanError scan_error(const BlindDirections& blind) {
+ScanError scan_error(const BlindDirections& blind, double misfit) {
     const double most = blind.count > 0 ? blind.blend.head(blind.count).maxCoeff() : 0.0;
-    return {kRotation * kRotation, most * kPosition * kPosition};
+    const double rotation = kRotation * (misfit < kMostMisfit ? misfit : kMostMisfit);
+    return {rotation * rotation, most * kPosition * kPosition};
 }
 
 }  // namespace d2lio

@@ -177,8 +177,8 @@ double Plugin::diagnostics_value(std::size_t i) const {
 const ScanDiagnostics& Plugin::diagnostics() const { return core_->last; }
 const NoiseAwareConfig& Plugin::noise_aware() const { return core_->degeneracy.noise_aware; }
 BlindDirections Plugin::find_blind(const SurfaceSums& sums) { return core_->find_blind(sums); }
-ScanError Plugin::scan_error() const {
-    return reads_surfaces() ? d2lio::scan_error(core_->blind_now) : ScanError{};
+ScanError Plugin::scan_error(double misfit) const {
+    return reads_surfaces() ? d2lio::scan_error(core_->blind_now, misfit) : ScanError{};
 }
 void Plugin::note_cleaned(int rows) { core_->current.cleaned = rows; }
 

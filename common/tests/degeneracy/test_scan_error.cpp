@@ -1,10 +1,11 @@
 // SPDX-FileCopyrightText: 2026 D2-LIO contributors
 // SPDX-License-Identifier: BSD-3-Clause
-#include "d2lio/degeneracy/scan_error.hpp"
-
 #include <gtest/gtest.h>
 
+#include <limits>
 #include <random>
+
+#include "d2lio/degeneracy/scan_error.hpp"
 
 namespace d2lio {
 namespace {
@@ -35,14 +36,23 @@ const Vec6 kError = (Vec6() << 0.3, 0.3, 0.3, 0.01, 0.01, 0.01).finished();
 
 TEST(ScanError, DoubtsThePositionAsFarAsADirectionIsBlind) {
     BlindDirections blind;
-    EXPECT_DOUBLE_EQ(scan_error(blind).position, 0.0);
+    EXPECT_DOUBLE_EQ(scan_error(blind, 1.0).position, 0.0);
     blind.count = 2;
     blind.blend = {1.0, 0.25, 0.9};  // the third does not count
-    const double whole = scan_error(blind).position;
+    const double whole = scan_error(blind, 1.0).position;
     EXPECT_DOUBLE_EQ(whole, 25e-6);
     blind.blend[0] = 0.5;
-    EXPECT_DOUBLE_EQ(scan_error(blind).position, 0.5 * whole);
-    EXPECT_DOUBLE_EQ(scan_error(blind).rotation, 0.25e-6);
+    EXPECT_DOUBLE_EQ(scan_error(blind, 1.0).position, 0.5 * whole);
+}
+
+TEST(ScanError, DoubtsTheRotationAsFarAsTheRowsDisagree) {
+    const BlindDirections none;
+    EXPECT_DOUBLE_EQ(scan_error(none, 1.0).rotation, 0.25e-6);
+    EXPECT_DOUBLE_EQ(scan_error(none, 0.1).rotation, 0.25e-8);
+    EXPECT_EQ(scan_error(none, 0.0).rotation, 0.0);
+    EXPECT_DOUBLE_EQ(scan_error(none, 1e9).rotation, 16 * 0.25e-6);
+    EXPECT_DOUBLE_EQ(scan_error(none, std::numeric_limits<double>::quiet_NaN()).rotation,
+                     16 * 0.25e-6);
 }
 
 TEST(ScanError, AddsItsVarianceToThatOfTheSolution) {

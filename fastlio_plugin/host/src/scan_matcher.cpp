@@ -85,7 +85,8 @@ void ScanMatcher::append_prior(const NavState& x, Linearisation& out) {
     if (adapter_.condition(rows, {x.rot.data(), x.pos.data()}, variance_, &prior) != Status::kOk) {
         return;
     }
-    out.error = adapter_.scan_error();
+    const double squares = out.residual.head(out.rows).squaredNorm();
+    out.error = adapter_.scan_error(squares / (static_cast<double>(out.rows) * variance_));
     for (int i = 0; i < prior.count; ++i) {
         for (int j = 0; j < 6; ++j) out.H(out.rows, j) = prior.jacobian[i][j];
         out.H.block<1, 6>(out.rows, 6).setZero();

@@ -23,14 +23,18 @@ constexpr float kPlaneDistance = 0.2F;  ///< m, of every neighbour from the plan
 constexpr double kWeightSlope = 0.9;    ///< of LIO-SAM's s
 constexpr float kInfinity = std::numeric_limits<float>::infinity();
 
+/// The kernel's scale by the upper quartile of the distances (2.3 sigma of normal ones), and the
+/// least share of what is configured.
+constexpr double kQuartile = 0.75, kKernelByQuartile = 2.0, kLeastKernel = 0.3;
+
 constexpr double kDegree = 57.29577951308232;
 constexpr double kCentimetre = 100.0;
 
 /// The weight a correspondence gets from its distance alone; LIO-SAM's s or the square root of the
 /// Cauchy kernel's weight (rows are multiplied by it, so the cost sees its square).
-double weight_of(const MatchOptions& o, Feature feature, double distance, double range) {
+double weight_of(double kernel_scale, Feature feature, double distance, double range) {
     const double d = std::abs(distance);
-    if (o.kernel_scale > 0.0) return 1.0 / std::sqrt(1.0 + std::pow(d / o.kernel_scale, 2));
+    if (kernel_scale > 0.0) return 1.0 / std::sqrt(1.0 + std::pow(d / kernel_scale, 2));
     if (feature == Feature::kCorner) return 1.0 - kWeightSlope * d;
     return 1.0 - kWeightSlope * d / std::sqrt(range);
 }
@@ -41,6 +45,7 @@ ScanToMap::ScanToMap(Adapter& adapter, const MatchOptions& options, int threads)
     : adapter_(adapter),
       options_(options),
       loop_(threads),
+      kernel_scale_(options.kernel_scale),
       spread_(static_cast<float>(mean_spread(options.map_leaf))) {}
 
 /// Nearest map points. By the triangle inequality the neighbours of the last search still lie
@@ -110,7 +115,7 @@ ScanToMap::Row ScanToMap::match(Feature feature, std::size_t index, const Eigen:
     Match m{Eigen::Vector3f::Zero(), 0.0, patch};
     if (!admit(feature, index, range, near, map) || !fit(feature, index, near, q, m)) return row;
     const double weight =
-        adapter_.weigh(feature, index, weight_of(options_, feature, m.distance, range));
+        adapter_.weigh(feature, index, weight_of(kernel_scale_, feature, m.distance, range));
     if (!(weight > 0.0)) return row;
     const Vec3 n = m.normal.cast<double>();
     row.jacobian << weight * p.cross(T.R.transpose() * n), weight * n;
@@ -218,7 +223,7 @@ void ScanToMap::clean(const Pose& T) {
 
 /// Where the guess is an estimate of its own, the scan's own error as a rigid body matters.
 void ScanToMap::limit(Mat6& AtA, Vec6& Atb) const {
-    const ScanError error = adapter_.scan_error();
+    const ScanError error = adapter_.scan_error(mean_square() / options_.variance);
     Vec6 variances;
     variances << Vec3::Constant(error.rotation), Vec3::Constant(error.position);
     limit_information<6>(variances / options_.variance, AtA, Atb);
@@ -234,6 +239,21 @@ void ScanToMap::add_prior(const Pose& T, Mat6& AtA, Vec6& Atb) const {
     const Mat6 W = options_.variance * *prior_;
     AtA.noalias() += J.transpose() * W * J;
     Atb.noalias() -= J.transpose() * (W * e);
+}
+
+/// How far the points of this place lie from its surfaces: walls to 2 cm, bushes to a decimetre.
+/// Beyond that a distance is a wrong match, and there are many along a street.
+void ScanToMap::learn_kernel() {
+    distances_.clear();
+    for (const Row& row : rows_) {
+        if (row.used) distances_.push_back(std::abs(row.residual / row.weight));
+    }
+    if (options_.kernel_scale <= 0.0 || distances_.empty()) return;
+    const double rank = kQuartile * static_cast<double>(distances_.size());
+    const auto quartile = distances_.begin() + static_cast<std::ptrdiff_t>(rank);
+    std::nth_element(distances_.begin(), quartile, distances_.end());
+    kernel_scale_ = std::clamp(kKernelByQuartile * *quartile, kLeastKernel * options_.kernel_scale,
+                               options_.kernel_scale);
 }
 
 void ScanToMap::learn_bends() {
@@ -308,6 +328,7 @@ MatchReport ScanToMap::align(const MatchInput& input, Pose& T_map_imu, const Mat
     if (adapter_.reads_surfaces()) {
         report.mean_square = mean_square();
         learn_bends();
+        learn_kernel();
     }
     return report;
 }

@@ -42,9 +42,9 @@ struct MatchReport {
     bool degenerate = false;  ///< some direction is weak, judged on the scan's own rows
     bool remapped = false;    ///< the host's own remapping held back some direction
     Mat6 information =
-        Mat6::Zero();  ///< A^T A of the scan's rows at the last iterate; tangent order
+        Mat6::Zero();             ///< A^T A of the scan's rows at the last iterate; tangent order
     Mat6 limited = Mat6::Zero();  ///< the same as the estimate took it; see ScanError
-    double mean_square = 0.0;  ///< of the rows' residuals at the last iterate, m^2 (noise_aware)
+    double mean_square = 0.0;     ///< of the rows' residuals at the last iterate, m^2 (noise_aware)
     double search_ms = 0.0;
 };
 
@@ -71,7 +71,10 @@ class ScanToMap {
     /// At rest the rows are only looked at (method noise_aware): also while rest is watched for,
     /// when the noise that holds a blind direction does no harm and its absence would.
     void set_resting(bool resting) { resting_ = resting; }
-    void reset() { bends_.reset(); }
+    void reset() {
+        bends_.reset();
+        kernel_scale_ = options_.kernel_scale;
+    }
 
   private:
     struct Row {
@@ -114,10 +117,13 @@ class ScanToMap {
     void limit(Mat6& AtA, Vec6& Atb) const;
     void add_prior(const Pose& T, Mat6& AtA, Vec6& Atb) const;
     void learn_bends();
+    void learn_kernel();
 
     Adapter& adapter_;
     MatchOptions options_;
     PointLoop loop_;
+    double kernel_scale_;  ///< m, of this scan; learnt from the last one (noise_aware)
+    std::vector<double> distances_;
     bool bounded_search_ = true;
     std::vector<Row> rows_;
     std::vector<Vec6> unweighted_;

@@ -87,7 +87,8 @@ class Plugin {
     const NoiseAwareConfig& noise_aware() const;
     BlindDirections find_blind(const SurfaceSums& sums);
     /// Of the scan being matched; nothing with another method.
-    ScanError scan_error() const;
+    /// @param misfit mean square of its rows' residuals by the variance of a row.
+    ScanError scan_error(double misfit) const;
     void note_cleaned(int rows);
 
   protected:
