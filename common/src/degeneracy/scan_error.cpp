@@ -6,14 +6,15 @@ namespace d2lio {
 namespace {
 
 constexpr double kRotation = 0.5e-3;  ///< rad, at a misfit of 1
-constexpr double kMostMisfit = 4.0;
+constexpr double kMostMisfit = 2.0;
 constexpr double kPosition = 5e-3;  ///< m, where a direction is blind
 
 }  // namespace
 
 ScanError scan_error(const BlindDirections& blind, double misfit) {
     const double most = blind.count > 0 ? blind.blend.head(blind.count).maxCoeff() : 0.0;
-    const double rotation = kRotation * (misfit < kMostMisfit ? misfit : kMostMisfit);
+    const double disagreement = misfit < kMostMisfit ? misfit : kMostMisfit;
+    const double rotation = kRotation * disagreement * disagreement;
     return {rotation * rotation, most * kPosition * kPosition};
 }
 

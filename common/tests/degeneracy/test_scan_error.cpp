@@ -48,7 +48,7 @@ TEST(ScanError, DoubtsThePositionAsFarAsADirectionIsBlind) {
 TEST(ScanError, DoubtsTheRotationAsFarAsTheRowsDisagree) {
     const BlindDirections none;
     EXPECT_DOUBLE_EQ(scan_error(none, 1.0).rotation, 0.25e-6);
-    EXPECT_DOUBLE_EQ(scan_error(none, 0.1).rotation, 0.25e-8);
+    EXPECT_DOUBLE_EQ(scan_error(none, 0.1).rotation, 0.25e-10);
     EXPECT_EQ(scan_error(none, 0.0).rotation, 0.0);
     EXPECT_DOUBLE_EQ(scan_error(none, 1e9).rotation, 16 * 0.25e-6);
     EXPECT_DOUBLE_EQ(scan_error(none, std::numeric_limits<double>::quiet_NaN()).rotation,
