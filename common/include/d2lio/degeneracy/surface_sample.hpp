@@ -1,0 +1,41 @@
+// SPDX-FileCopyrightText: 2026 D2-LIO contributors
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <cstddef>
+#include <vector>
+
+#include "d2lio/degeneracy/bend.hpp"
+#include "d2lio/degeneracy/blind.hpp"
+#include "d2lio/geometry/plane.hpp"
+
+namespace d2lio {
+
+/// Surfaces of which only sums are wanted: what is noise, and what bends. They are kept as they are
+/// found and looked at together, four at a time, as the vector unit likes it, in a third of the
+/// time of as many patches. set() and leave_out() may be called for different rows at a time.
+class SurfaceSample {
+  public:
+    /// Makes room; every row has to be set or left out.
+    void resize(std::size_t rows);
+    /// @param xyz, stride of Patch::kCount neighbours, see make_patch(). @param p the point that is
+    /// matched with them.
+    void set(std::size_t row, const float* xyz, int stride, const PlaneMoments& moments,
+             const Eigen::Vector3f& normal, const SurfaceSide& side, const Eigen::Vector3f& p);
+    void leave_out(std::size_t row);
+    /// As of patches of all rows, to rounding. @param bends learns from them.
+    SurfaceSums survey(BendField& bends) const;
+
+  private:
+    static constexpr std::size_t kWidth = 4;
+    /// Of a row: normal, scatter, from the centroid the neighbours and p.
+    static constexpr std::size_t kNormal = 0, kScatter = 3, kOffsets = 9, kPoint = 24, kFloats = 27;
+    float* begin(std::size_t row) {
+        return floats_.data() + row / kWidth * (kWidth * kFloats) + row % kWidth;
+    }
+
+    std::vector<float> floats_;  ///< blocks of kWidth rows, in each one entry of all after another
+    std::vector<SurfaceSide> sides_;
+};
+
+}  // namespace d2lio
