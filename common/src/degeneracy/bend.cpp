@@ -11,7 +11,6 @@ constexpr double kKeep = 0.9;                ///< share of the past that a new s
 constexpr double kPointVariance = 4e-4;      ///< m^2, of a neighbour's distance from the surface
 constexpr double kSignificance = 2.0 * 2.0;  ///< sigmas squared
 constexpr double kMinRun = 1e-12;            ///< m^4
-constexpr double kMinTrace = 1e-6;           ///< m^2
 
 /// The estimate, shrunk by the share of it that noise alone may give (James, Stein 1961).
 double shrunk(double bend, double variance) {
@@ -22,12 +21,10 @@ double shrunk(double bend, double variance) {
 
 }  // namespace
 
-void BendField::add(const BendSample& sample) {
-    const auto i = static_cast<std::size_t>(sample.facing);
-    rise_[i] += static_cast<double>(sample.rise);
-    run_[i] += static_cast<double>(sample.run);
-    levels_[i] += static_cast<double>(sample.level);
-    traces_[i] += static_cast<double>(sample.trace);
+void BendField::add(const Patch& patch) {
+    const auto i = static_cast<std::size_t>(patch.side.facing);
+    rise_[i] += static_cast<double>(patch.bend_rise);
+    run_[i] += static_cast<double>(patch.bend_run);
 }
 
 void BendField::end_scan() {
@@ -36,9 +33,6 @@ void BendField::end_scan() {
         const double run = std::max(run_[i], kMinRun);
         bend_[i] = static_cast<float>(shrunk(rise_[i] / run, kPointVariance / run));
         any_ = any_ || bend_[i] != 0.F;
-        if (traces_[i] > kMinTrace) level_[i] = static_cast<float>(levels_[i] / traces_[i]);
-        levels_[i] *= kKeep;
-        traces_[i] *= kKeep;
         rise_[i] *= kKeep;
         run_[i] *= kKeep;
     }

@@ -5,7 +5,6 @@
 #include <Eigen/Cholesky>
 #include <Eigen/Geometry>
 #include <Eigen/LU>
-#include <algorithm>
 
 #include "d2lio/degeneracy/clean_rows.hpp"
 #include "d2lio/geometry/so3.hpp"
@@ -73,14 +72,14 @@ struct Adapter::Impl {
     bool at_rest = false;  ///< this one
     std::vector<HostRows::Entry> listed;
     RowCleaner cleaner;
-    PatchChoice choice = PatchChoice{true, {}};
+    Gate::Look look = Gate::Look::kAll;
 
     bool read(const ScanInput& input, Core& core);
     void copy_rows(const PriorRows& rows);
-    int list_speaking();
+    int list_accepted();
     bool settled() const { return rested || scans > kSettlingScans; }
     void clean(const Rows& rows, const Pose& x, double row_variance, Core& core);
-    void choose_patches(const Core& core);
+    void choose_look(const Core& core);
     Status remove_prior(double* covariance, int size) const;
 };
 
@@ -134,8 +133,8 @@ Status Adapter::begin_scan(const ScanInput& input) {
     impl_->rested = impl_->rested || input.at_rest;
     const bool usable = impl_->read(input, core());
     const Status status = core().begin(usable, to_pose(input.previous));
-    const bool looks = core().degeneracy.cleans_rows();
-    impl_->gate.begin_scan(input.points, core().predicted.t, looks ? &impl_->choice : nullptr);
+    if (!core().degeneracy.cleans_rows()) impl_->look = Gate::Look::kNot;
+    impl_->gate.begin_scan(input.points, core().predicted.t, impl_->look);
     return status;
 }
 
@@ -154,62 +153,49 @@ void Adapter::Impl::copy_rows(const PriorRows& p) {
     rows.count = p.count;
 }
 
-/// Where the last scan saw every direction well, a small sample of the next one's surfaces will
-/// tell. Else directions of which it saw half as well may turn out to be blind.
-void Adapter::Impl::choose_patches(const Core& core) {
-    NoiseAwareConfig wary = core.degeneracy.noise_aware;
-    wary.share_high = 0.5 * wary.share_low;
-    wary.share_low = 0.5 * wary.share_high;
-    const Vec3& share = core.current.noise_share;
-    choice = PatchChoice{!(share[0] < wary.share_high), {}};
-    if (!choice.many || !share.allFinite()) return;
-    const BlindDirections doubtful =
-        d2lio::find_blind({share, core.current.noise_axes}, core.P_t, wary);
-    choice.test.emplace(doubtful, wary);
+/// Where the last scan saw every direction well, a sample of the next one's surfaces will tell.
+void Adapter::Impl::choose_look(const Core& core) {
+    const double well = 0.5 * core.degeneracy.noise_aware.share_low;
+    const bool seeing = core.current.noise_share[0] < well;
+    look = seeing ? Gate::Look::kSample : Gate::Look::kAll;
 }
 
-/// Lists the rows that may speak of a blind direction. @returns how many rows there are.
-int Adapter::Impl::list_speaking() {
+/// Lists the accepted points, or of those the ones that speak of a blind direction: the others come
+/// without what they had to lose. @returns how many were accepted.
+int Adapter::Impl::list_accepted() {
     const std::vector<Verdict>& verdicts = gate.book().verdicts();
+    const bool all = !gate.cleans();
     listed.clear();
-    const auto accepted = [&](std::size_t from, std::size_t to) {  // of which a compiler makes much
-        const Verdict* const v = verdicts.data();
-        return static_cast<int>(std::count(v + from, v + to, Verdict::kAccepted));
-    };
     int rows = 0;
-    std::size_t counted = 0;
-    for (std::size_t i = gate.next_speaker(0); i < verdicts.size(); i = gate.next_speaker(i + 1)) {
-        rows += accepted(counted, i);
-        counted = i;
-        if (verdicts[i] == Verdict::kAccepted) listed.push_back({rows, i});
+    for (std::size_t i = 0; i < verdicts.size(); ++i) {
+        if (verdicts[i] != Verdict::kAccepted) continue;
+        if (all || gate.speaks(i)) listed.push_back({rows, i});
+        ++rows;
     }
-    return rows + accepted(counted, verdicts.size());
+    return rows;
 }
 
 /// Takes what noise has put into the rows along blind directions out of them (method noise_aware).
-/// What is blind is found from the first rows of a scan. They are cleaned where they are; from then
-/// on the gate gives normals that are clean already, all but those of the few rows that speak.
+/// What is blind is found from the scan's first rows that show it; from then on the gate gives
+/// normals that are clean already, all but those of the few rows that speak.
 void Adapter::Impl::clean(const Rows& rows, const Pose& x, double row_variance, Core& core) {
-    if (!choice.many) {
-        if (!gate.surveyed()) core.find_blind(gate.survey());
+    const bool searched = gate.searched();
+    if (look == Gate::Look::kSample) {
+        if (searched) core.find_blind(gate.sums());
         core.forget_blind();  // too few patches to act by
         return;
     }
-    const int count = list_speaking();
-    if (count != rows.count) return;  // not the rows offered here
-    if (!gate.surveyed()) core.find_blind(gate.survey());
+    const int accepted = list_accepted();
+    if (accepted != rows.count) return;  // not the rows offered here
+    if (searched && !gate.cleans()) core.find_blind(gate.sums());
     const BlindDirections blind = core.blind_now;
     if (blind.count == 0 || at_rest || !settled()) return;
     const NoiseAwareConfig& config = core.degeneracy.noise_aware;
-    HostRows host(rows, row_variance, x, gate, listed);
-    if (gate.cleans()) {
-        host.forget_extrinsic_of_others();
-    } else {
-        gate.clean(blind, config);
-        host.clean_others(blind);
-    }
-    const int others = count - static_cast<int>(listed.size());
-    core.current.cleaned = others + cleaner.clean(blind, config, host);
+    HostRows host(rows, row_variance, x, gate, listed, blind);
+    if (gate.cleans()) host.scale_extrinsics(0.0);
+    core.current.cleaned = cleaner.clean(blind, config, host);
+    core.current.cleaned += accepted - static_cast<int>(listed.size());
+    gate.clean(blind, config);
 }
 
 Status Adapter::condition(const Rows& rows, const PoseView& pose, double variance,
@@ -244,7 +230,7 @@ Status Adapter::end_scan(const PoseView& posterior, bool converged, double* cova
         status = impl_->remove_prior(covariance, size);
     }
     impl_->gate.end_scan();
-    impl_->choose_patches(core());
+    impl_->choose_look(core());
     impl_->gate.book().close(core().current);
     core().publish();
     return status;
@@ -254,7 +240,7 @@ void Adapter::reset() {
     Plugin::reset();
     impl_->gate.reset();
     impl_->scans = 0;
-    impl_->choice = PatchChoice{true, {}};
+    impl_->look = Gate::Look::kAll;
     impl_->rested = false;
 }
 

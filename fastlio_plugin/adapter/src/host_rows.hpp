@@ -3,16 +3,17 @@
 #pragma once
 
 #include <Eigen/Geometry>
-#include <cstddef>
+#include <array>
 #include <vector>
 
 #include "d2lio/degeneracy/clean_rows.hpp"
 #include "d2lio/fastlio/adapter.hpp"
+#include "d2lio/geometry/so3.hpp"
 #include "gate.hpp"
 
 namespace d2lio::fastlio {
 
-/// The host's rows that may speak of a blind direction, as RowCleaner sees them, and the others.
+/// The host's rows as RowCleaner sees them.
 class HostRows {
   public:
     struct Entry {
@@ -20,15 +21,19 @@ class HostRows {
         std::size_t point;
     };
 
-    /// @param listed the rows that may speak, ascending. @param variance of a residual, m^2.
-    HostRows(const Rows& rows, double variance, const Pose& x, Gate& gate,
-             const std::vector<Entry>& listed)
+    /// @param listed the rows to be seen, of accepted points. @param variance of a residual, m^2.
+    HostRows(const Rows& rows, double variance, const Pose& x, const Gate& gate,
+             const std::vector<Entry>& listed, const BlindDirections& blind)
         : rows_(rows),
           variance_(variance),
           R_inverse_(x.R.transpose()),
           t_(x.t),
           gate_(gate),
-          listed_(listed) {}
+          listed_(listed) {
+        for (int i = 0; i < blind.count; ++i) {
+            levers_[static_cast<std::size_t>(i)] = -R_inverse_ * hat(blind.axes.col(i));
+        }
+    }
 
     std::size_t size() const { return listed_.size(); }
     Vec3 normal(std::size_t k) const { return at(row_of(k), rows_.position_column); }
@@ -37,51 +42,40 @@ class HostRows {
         return trust(rows_.residual[listed_[k].row], normal, *patch(k), blind, variance_);
     }
 
+    /// Of the rotation's column R^T (arm x n) goes R^T (arm x d), a linear function of the arm.
+    void take_out(std::size_t k, const BlindDirections& blind, const Vec3& components) {
+        double* const row = row_of(k);
+        const Vec3 arm = gate_.point(listed_[k].point).cast<double>() - t_;
+        Vec3 n = at(row, rows_.position_column), turn = at(row, rows_.rotation_column);
+        for (int i = 0; i < blind.count; ++i) {
+            n -= components[i] * blind.axes.col(i);
+            turn -= components[i] * (levers_[static_cast<std::size_t>(i)] * arm);
+        }
+        put(row, rows_.position_column, n);
+        put(row, rows_.rotation_column, turn);
+        scale_extrinsic(row, 0.0);
+    }
+
     void replace(std::size_t k, const CleanedRow& cleaned, bool lost) {
         double* const row = row_of(k);
+        const Vec3 arm = gate_.point(listed_[k].point).cast<double>() - t_;
         const Vec3 kept = cleaned.weight * cleaned.normal;
         put(row, rows_.position_column, kept);
-        put(row, rows_.rotation_column, turn_of(listed_[k].point, kept));
+        put(row, rows_.rotation_column, R_inverse_ * arm.cross(kept));
         rows_.residual[listed_[k].row] *= cleaned.weight;
         scale_extrinsic(row, lost ? 0.0 : cleaned.weight);
     }
 
-    /// Takes out of the rows that are not listed what they cannot prove, and tells the gate.
-    void clean_others(const BlindDirections& blind) {
-        for_others([&](double* row, std::size_t i) {
-            const Vec3 kept = without(at(row, rows_.position_column), blind);
-            put(row, rows_.position_column, kept);
-            put(row, rows_.rotation_column, turn_of(i, kept));
-            scale_extrinsic(row, 0.0);
-            gate_.tell(i, kept);
-        });
-    }
-    /// Where those have come clean already.
-    void forget_extrinsic_of_others() {
+    /// Of all rows, listed or not.
+    void scale_extrinsics(double share) const {
         if (rows_.extrinsic_column < 0) return;
-        for_others([this](double* row, std::size_t) { scale_extrinsic(row, 0.0); });
+        for (int row = 0; row < rows_.count; ++row) {
+            scale_extrinsic(rows_.jacobian + row * rows_.row_step, share);
+        }
     }
 
   private:
-    template <typename F>
-    void for_others(const F& f) {
-        const std::vector<Verdict>& verdicts = gate_.book().verdicts();
-        double* row = rows_.jacobian;
-        auto next = listed_.begin();
-        for (std::size_t i = 0; i < verdicts.size(); ++i) {
-            if (verdicts[i] != Verdict::kAccepted) continue;
-            const bool listed = next != listed_.end() && next->point == i;
-            if (listed) ++next;
-            if (!listed) f(row, i);
-            row += rows_.row_step;
-        }
-    }
     double* row_of(std::size_t k) const { return rows_.jacobian + listed_[k].row * rows_.row_step; }
-    /// The rotation's part of the row of point i with this normal.
-    Vec3 turn_of(std::size_t i, const Vec3& normal) const {
-        const Vec3 arm = gate_.point(i).cast<double>() - t_;
-        return R_inverse_ * arm.cross(normal);
-    }
     Vec3 at(const double* row, int column) const {
         const double* const from = row + column * rows_.column_step;
         return {from[0], from[rows_.column_step], from[2 * rows_.column_step]};
@@ -103,8 +97,9 @@ class HostRows {
     const double variance_;
     const Mat3 R_inverse_;
     const Vec3 t_;
-    Gate& gate_;
+    const Gate& gate_;
     const std::vector<Entry>& listed_;
+    std::array<Mat3, 3> levers_;  ///< an arm to R^T (arm x d), for each blind d
 };
 
 }  // namespace d2lio::fastlio

@@ -39,7 +39,7 @@ struct HostConfig {
     double odometry_leaf = 0.4;                            ///< m, voxel of a ring's surfaces
     double corner_leaf = 0.2, surface_leaf = 0.4;          ///< m, voxels of scan and submap
     int max_clouds = 1500;                                 ///< keyframe clouds kept
-    double direct_leaf = 0.3;                  ///< m, voxel of the scan, front end direct
+    double direct_leaf = 0.4;                  ///< m, voxel of the scan, front end direct
     double direct_map_leaf = 0.25;             ///< m, voxel of the submap, front end direct
     double kernel_scale = 0.1;                 ///< m, front end direct
     int min_corners = 10, min_surfaces = 100;  ///< features that matching needs

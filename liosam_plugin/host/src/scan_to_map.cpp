@@ -195,6 +195,9 @@ class ScanToMap::UsedRows {
         const Row& row = rows_[used_[k]];
         return trust(row.residual / row.weight, normal, *patch(k), blind, options_.variance);
     }
+    void take_out(std::size_t k, const BlindDirections& blind, const Vec3& components) {
+        replace(k, {normal(k) - blind.axes * components, 1.0}, true);
+    }
     void replace(std::size_t k, const CleanedRow& cleaned, bool /*lost*/) {
         Row& row = rows_[used_[k]];
         const Vec3 kept = row.weight * cleaned.weight * cleaned.normal;

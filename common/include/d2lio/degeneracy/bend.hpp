@@ -13,15 +13,6 @@ namespace d2lio {
 /// @param leaf side of the voxel, m.
 constexpr double mean_spread(double leaf) { return leaf * leaf / 12.0; }
 
-/// What a patch tells of the bend of what it lies on.
-struct BendSample {
-    float rise = 0.F, run = 0.F;  ///< as in Patch
-    /// Height of the plane through the half squared distances at the point that is matched with the
-    /// patch, and trace of the neighbours' scatter; m^2.
-    float level = 0.F, trace = 0.F;
-    int facing = 0;
-};
-
 /// Mean curvature of what the sensor sees, by the direction the surface faces (1/m, positive where
 /// it bends towards the sensor, as the vault of a tunnel does).
 ///
@@ -35,12 +26,7 @@ class BendField {
     /// Bend of a facing as learnt from earlier scans.
     float at(int facing) const { return bend_[static_cast<std::size_t>(facing)]; }
     bool any() const { return any_; }  ///< whether at() is not zero everywhere
-    /// Mean BendSample::level by trace.
-    float level(int facing) const { return level_[static_cast<std::size_t>(facing)]; }
-    void add(const Patch& patch) {
-        add({patch.bend_rise, patch.bend_run, 0.F, 0.F, patch.side.facing});
-    }
-    void add(const BendSample& sample);
+    void add(const Patch& patch);
     /// How far the surface of a patch lies from its plane at p, along the plane's normal (m).
     /// @param spread of mean_spread(), where the neighbours are means.
     float sag(const Patch& patch, const Eigen::Vector3f& normal, const Eigen::Vector3f& p,
@@ -54,8 +40,7 @@ class BendField {
 
   private:
     std::array<double, kFacings> rise_{}, run_{};
-    std::array<double, kFacings> levels_{}, traces_{};  ///< sums, m^2
-    std::array<float, kFacings> bend_{}, level_{};
+    std::array<float, kFacings> bend_{};
     bool any_ = false;
 };
 

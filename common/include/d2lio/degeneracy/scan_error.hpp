@@ -21,8 +21,8 @@ struct ScanError {
 };
 
 /// The position is only doubted as far as a direction of it is blind: elsewhere the position itself
-/// matters, and the rows are right. The rotation is doubted by the square of the rows' misfit: smooth
-/// walls (0.1) tell a tunnel's pitch to less than 0.05 mrad, and gravity asks for that.
+/// matters, and the rows are right. The rotation is doubted by the square of the rows' misfit:
+/// smooth walls (0.1) tell a tunnel's pitch to less than 0.05 mrad, and gravity asks for that.
 /// @param blind of the scan. @param misfit mean square of its rows' residuals by the variance of a
 /// row.
 ScanError scan_error(const BlindDirections& blind, double misfit);
