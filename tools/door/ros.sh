@@ -6,7 +6,7 @@
 
 # To build the nodes, to start and watch them, and to play bags.
 ROS_PACKAGES=(
-    catkin python3-catkin-pkg ros-message-generation ros-message-runtime
+    catkin python3-catkin-pkg ros-message-generation ros-message-runtime ros-std-msgs
     libroscpp-dev libtopic-tools-dev libtf2-ros-dev libxmlrpcpp-dev libyaml-cpp-dev
     libdiagnostic-msgs-dev libgeometry-msgs-dev libnav-msgs-dev libsensor-msgs-dev
     libstd-srvs-dev libvisualization-msgs-dev
