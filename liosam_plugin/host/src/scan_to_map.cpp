@@ -23,9 +23,10 @@ constexpr float kPlaneDistance = 0.2F;  ///< m, of every neighbour from the plan
 constexpr double kWeightSlope = 0.9;    ///< of LIO-SAM's s
 constexpr float kInfinity = std::numeric_limits<float>::infinity();
 
-/// The kernel's scale by the upper quartile of the distances (2.3 sigma of normal ones), and the
-/// least share of what is configured.
-constexpr double kQuartile = 0.75, kKernelByQuartile = 2.0, kLeastKernel = 0.3;
+/// The kernel's scale by the upper quartile of the distances (2.3 sigma of normal ones), and its
+/// limits in shares of what is configured: from scan to scan, and within one that is still moving.
+constexpr double kQuartile = 0.75, kKernelByQuartile = 2.0;
+constexpr double kLeastKernel = 0.3, kMostKernel = 1.0, kMostKernelWithin = 5.0;
 
 constexpr double kDegree = 57.29577951308232;
 constexpr double kCentimetre = 100.0;
@@ -242,8 +243,11 @@ void ScanToMap::add_prior(const Pose& T, Mat6& AtA, Vec6& Atb) const {
 }
 
 /// How far the points of this place lie from its surfaces: walls to 2 cm, bushes to a decimetre.
-/// Beyond that a distance is a wrong match, and there are many along a street.
-void ScanToMap::learn_kernel() {
+/// Beyond that a distance is a wrong match, and there are many along a street. While a scan is being
+/// moved to the map all its distances are long, and a kernel as narrow as the place would hold it
+/// where it is: at a start in motion, for good.
+/// @param most share of the configured scale.
+void ScanToMap::learn_kernel(double most) {
     distances_.clear();
     for (const Row& row : rows_) {
         if (row.used) distances_.push_back(std::abs(row.residual / row.weight));
@@ -253,7 +257,7 @@ void ScanToMap::learn_kernel() {
     const auto quartile = distances_.begin() + static_cast<std::ptrdiff_t>(rank);
     std::nth_element(distances_.begin(), quartile, distances_.end());
     kernel_scale_ = std::clamp(kKernelByQuartile * *quartile, kLeastKernel * options_.kernel_scale,
-                               options_.kernel_scale);
+                               most * options_.kernel_scale);
 }
 
 void ScanToMap::learn_bends() {
@@ -307,6 +311,7 @@ bool ScanToMap::step(const MatchInput& input, Pose& T, MatchReport& report) {
         return false;
     }
     T = next;
+    if (adapter_.reads_surfaces()) learn_kernel(kMostKernelWithin);
     report.status = MatchStatus::kOk;
     report.converged = d.head<3>().norm() * kDegree < options_.rotation_epsilon &&
                        d.tail<3>().norm() * kCentimetre < options_.translation_epsilon;
@@ -328,7 +333,7 @@ MatchReport ScanToMap::align(const MatchInput& input, Pose& T_map_imu, const Mat
     if (adapter_.reads_surfaces()) {
         report.mean_square = mean_square();
         learn_bends();
-        learn_kernel();
+        learn_kernel(kMostKernel);
     }
     return report;
 }

@@ -117,12 +117,12 @@ class ScanToMap {
     void limit(Mat6& AtA, Vec6& Atb) const;
     void add_prior(const Pose& T, Mat6& AtA, Vec6& Atb) const;
     void learn_bends();
-    void learn_kernel();
+    void learn_kernel(double most);
 
     Adapter& adapter_;
     MatchOptions options_;
     PointLoop loop_;
-    double kernel_scale_;  ///< m, of this scan; learnt from the last one (noise_aware)
+    double kernel_scale_;  ///< m; learnt from the last iteration, of whatever scan (noise_aware)
     std::vector<double> distances_;
     bool bounded_search_ = true;
     std::vector<Row> rows_;
