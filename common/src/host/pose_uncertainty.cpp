@@ -105,10 +105,14 @@ void PoseUncertainty::update(const NavState& x, const Match& match) {
     scan_noise_.diagonal().tail<3>().array() += kStraightness * kStraightness;
     if (!matched_) C_.bottomRightCorner<6, 6>() += scan_noise_;  // of the map's first scan
     matched_ = true;
+    // Without an extrinsic that is estimated the gain has six columns.
+    const bool pose_only = match.gain.rightCols<6>().isZero(0.0);
     transform([&](Joint& C) {  // e -= K H (e - m)
-        Eigen::Matrix<double, 12, kSize> apart = C.topRows<12>();
-        apart.topRows<6>() -= J.transpose() * C.bottomRows<6>();
-        C.topRows<I::kSize>() -= match.gain * apart;
+        Eigen::Matrix<double, 6, kSize> apart = C.topRows<6>();
+        apart -= J.transpose() * C.bottomRows<6>();
+        const Eigen::Matrix<double, 6, kSize> extrinsic = C.middleRows<6>(6);
+        C.topRows<I::kSize>() -= match.gain.leftCols<6>() * apart;
+        if (!pose_only) C.topRows<I::kSize>() -= match.gain.rightCols<6>() * extrinsic;
     });
     C_.topLeftCorner<I::kSize, I::kSize>() += misfit * match.noise;
     if (!C_.allFinite()) clear();

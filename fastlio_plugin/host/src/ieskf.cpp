@@ -16,7 +16,7 @@ void Linearisation::reserve(Eigen::Index n) {
 void Ieskf::limit(Mat12& HtH, Vec12& Htr) const {
     const ScanError& e = rows_.error;
     if (e.rotation == 0.0 && e.position == 0.0) return;
-    Vec12 variances = Vec12::Zero();
+    Vec6 variances;
     variances.segment<3>(StateIndex::kPos).setConstant(e.position);
     variances.segment<3>(StateIndex::kRot).setConstant(e.rotation);
     limit_information<12>(variances / options_.variance, HtH, Htr);

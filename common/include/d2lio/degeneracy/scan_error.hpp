@@ -2,7 +2,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
-#include <Eigen/LU>
+#include <Eigen/Cholesky>
 
 #include "d2lio/degeneracy/blind.hpp"
 
@@ -28,17 +28,22 @@ struct ScanError {
 ScanError scan_error(const BlindDirections& blind, double misfit);
 
 /// Normal equations of rows that have, besides their own noise, an error common to all:
-/// I -> (I^-1 + E)^-1 = M I and b -> M b with M = (1 + I E)^-1, which needs no inverse of I.
-/// @param error variances E of the states, by the variance of a row.
+/// I -> (I^-1 + E)^-1 and b -> (1 + I E)^-1 b, by Woodbury's identity, which needs no inverse of I.
+/// @param error variances E of the first six states, by the variance of a row.
 template <int N>
-void limit_information(const Eigen::Matrix<double, N, 1>& error, Eigen::Matrix<double, N, N>& AtA,
+void limit_information(const Vec6& error, Eigen::Matrix<double, N, N>& AtA,
                        Eigen::Matrix<double, N, 1>& Atb) {
-    using Matrix = Eigen::Matrix<double, N, N>;
-    const Matrix M = Matrix::Identity() + AtA * error.asDiagonal();
-    const Eigen::PartialPivLU<Matrix> lu(M);
-    const Matrix limited = lu.solve(AtA);
-    AtA = 0.5 * (limited + limited.transpose());
-    Atb = lu.solve(Atb).eval();
+    const Vec6 sigma = error.cwiseSqrt();
+    Eigen::Matrix<double, 6, N> felt = AtA.template topRows<6>();
+    felt.array().colwise() *= sigma.array();
+    Mat6 all = felt.template leftCols<6>() * sigma.asDiagonal();
+    all.diagonal().array() += 1.0;
+    const Eigen::LLT<Mat6> llt(all);
+    llt.matrixL().solveInPlace(felt);
+    Vec6 share = sigma.cwiseProduct(Atb.template head<6>());
+    llt.matrixL().solveInPlace(share);
+    AtA.noalias() -= felt.transpose().lazyProduct(felt);
+    Atb.noalias() -= felt.transpose() * share;
 }
 
 }  // namespace d2lio
