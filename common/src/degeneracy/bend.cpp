@@ -21,12 +21,6 @@ double shrunk(double bend, double variance) {
 
 }  // namespace
 
-void BendField::add(const Patch& patch) {
-    const auto i = static_cast<std::size_t>(patch.side.facing);
-    rise_[i] += static_cast<double>(patch.bend_rise);
-    run_[i] += static_cast<double>(patch.bend_run);
-}
-
 void BendField::end_scan() {
     any_ = false;
     for (std::size_t i = 0; i < bend_.size(); ++i) {

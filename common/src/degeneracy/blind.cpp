@@ -85,7 +85,6 @@ void stay_blind(const BlindDirections& before, BlindDirections& now) {
 
 ProofTest::ProofTest(const BlindDirections& blind, const NoiseAwareConfig& config)
     : axes_(blind.axes.cast<float>()),
-      blend_(blind.blend.cast<float>()),
       count_(blind.count),
       // A little less than the test itself asks for: single precision decides nothing here.
       least_(0.99F * static_cast<float>(kSoftFrom * config.significance * config.significance)) {}

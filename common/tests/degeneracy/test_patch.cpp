@@ -119,6 +119,24 @@ TEST(Patch, DoubtIsTheWorstOfLeavingOneNeighbourOut) {
     }
 }
 
+TEST(Patch, NoNormalIsKnownBetterThanTheBoundSays) {
+    test::Random random(14);
+    float least = 1.F;
+    for (const double size : {0.01, 0.1, 0.3, 0.6, 1.0, 3.0}) {
+        for (int round = 0; round < 50; ++round) {
+            const Surface plane = test::random_plane(random);
+            const Patch p = plane.sample(test::random_places(random, size), random, 0.0).patch();
+            for (int i = 0; i < 20; ++i) {
+                const double angle = random.uniform(0.0, 3.1416);
+                const Vec3 d = std::cos(angle) * plane.u + std::sin(angle) * plane.v;
+                least = std::min(least, p.formal_variance(d.cast<float>()));
+            }
+        }
+    }
+    EXPECT_GE(least, 0.99F * Patch::kLeastVariance);
+    EXPECT_LT(least, 1.3F * Patch::kLeastVariance);  // a bound that tells something
+}
+
 TEST(Patch, FourPointsOfAScanLineAndOneBesideItAreDoubted) {
     test::Random random(4);
     const Surface plane = test::random_plane(random);

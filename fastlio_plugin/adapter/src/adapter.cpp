@@ -70,13 +70,12 @@ struct Adapter::Impl {
     int scans = 0;         ///< since the last reset
     bool rested = false;   ///< one of them
     bool at_rest = false;  ///< this one
-    std::vector<HostRows::Entry> listed;
+    std::vector<HostRows::Entry> speaking;
     RowCleaner cleaner;
     Gate::Look look = Gate::Look::kAll;
 
     bool read(const ScanInput& input, Core& core);
     void copy_rows(const PriorRows& rows);
-    int list_accepted();
     bool settled() const { return rested || scans > kSettlingScans; }
     void clean(const Rows& rows, const Pose& x, double row_variance, Core& core);
     void choose_look(const Core& core);
@@ -160,42 +159,25 @@ void Adapter::Impl::choose_look(const Core& core) {
     look = seeing ? Gate::Look::kSample : Gate::Look::kAll;
 }
 
-/// Lists the accepted points, or of those the ones that speak of a blind direction: the others come
-/// without what they had to lose. @returns how many were accepted.
-int Adapter::Impl::list_accepted() {
-    const std::vector<Verdict>& verdicts = gate.book().verdicts();
-    const bool all = !gate.cleans();
-    listed.clear();
-    int rows = 0;
-    for (std::size_t i = 0; i < verdicts.size(); ++i) {
-        if (verdicts[i] != Verdict::kAccepted) continue;
-        if (all || gate.speaks(i)) listed.push_back({rows, i});
-        ++rows;
-    }
-    return rows;
-}
-
 /// Takes what noise has put into the rows along blind directions out of them (method noise_aware).
-/// What is blind is found from the scan's first rows that show it; from then on the gate gives
-/// normals that are clean already, all but those of the few rows that speak.
+/// What is blind is found from the first rows of a scan. They are cleaned where they are; from then
+/// on the gate gives normals that are clean already, all but those of the few rows that speak.
 void Adapter::Impl::clean(const Rows& rows, const Pose& x, double row_variance, Core& core) {
-    const bool searched = gate.searched();
+    if (gate.book().accepted() != rows.count) return;  // not the rows offered here
+    if (!gate.surveyed()) core.find_blind(gate.survey(rows.residual));
     if (look == Gate::Look::kSample) {
-        if (searched) core.find_blind(gate.sums());
         core.forget_blind();  // too few patches to act by
         return;
     }
-    const int accepted = list_accepted();
-    if (accepted != rows.count) return;  // not the rows offered here
-    if (searched && !gate.cleans()) core.find_blind(gate.sums());
     const BlindDirections blind = core.blind_now;
     if (blind.count == 0 || at_rest || !settled()) return;
     const NoiseAwareConfig& config = core.degeneracy.noise_aware;
-    HostRows host(rows, row_variance, x, gate, listed, blind);
-    if (gate.cleans()) host.scale_extrinsics(0.0);
-    core.current.cleaned = cleaner.clean(blind, config, host);
-    core.current.cleaned += accepted - static_cast<int>(listed.size());
+    const bool clean_already = gate.cleans();
     gate.clean(blind, config);
+    HostRows host(rows, row_variance, x, gate, speaking);
+    host.clean_others(blind, clean_already);
+    const int others = rows.count - static_cast<int>(host.size());
+    core.current.cleaned = others + cleaner.clean(blind, config, host);
 }
 
 Status Adapter::condition(const Rows& rows, const PoseView& pose, double variance,

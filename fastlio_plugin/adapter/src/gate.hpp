@@ -2,17 +2,14 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
-#include <atomic>
 #include <optional>
 #include <vector>
 
-#include "d2lio/degeneracy/bend.hpp"
-#include "d2lio/degeneracy/blind.hpp"
-#include "d2lio/degeneracy/patch.hpp"
 #include "d2lio/fastlio/adapter.hpp"
 #include "d2lio/geometry/plane.hpp"
 #include "d2lio/plugin/verdict_book.hpp"
 #include "d2lio/rejection/rejector.hpp"
+#include "surfaces.hpp"
 
 namespace d2lio::fastlio {
 
@@ -28,60 +25,51 @@ struct GateConstants {
 /// its own point, so any number of threads may call it.
 class Gate {
   public:
-    /// How closely the surfaces behind the points are looked at.
-    enum class Look {
-        kNot,
-        kSample,  ///< some, and those that face where the surface is known to bend
-        kAll,
-    };
+    /// At which surfaces behind the points to look.
+    enum class Look { kNot, kSample, kAll };
 
     /// @param sensor position, map frame.
     void begin_scan(std::size_t points, const Vec3& sensor, Look look);
     Verdict accept(const Candidate& candidate, const Rejector& rejector, Correspondence* out);
     /// Learns from the surfaces that were accepted.
     void end_scan();
-    void reset() { bends_.reset(); }
+    void reset() { surfaces_.reset(); }
 
     VerdictBook& book() { return book_; }
-    /// Of an accepted point; null where none was made.
-    const Patch* patch(std::size_t i) const { return has_patch_[i] ? &patches_[i] : nullptr; }
-    /// Map frame; only where every surface is looked at.
+    /// Of an accepted point, where all surfaces are looked at.
+    const Patch& patch(std::size_t i) { return surfaces_.patch(i); }
+    /// Map frame.
     const Eigen::Vector3f& point(std::size_t i) const { return points_[i]; }
-    /// Over the accepted points of the sample, or over all.
-    SurfaceSums sums() const;
+    /// Looks at the scan's surfaces.
+    /// @param residuals of the accepted points, the negative distances that accept() gave: where
+    /// only now is known how the surfaces bend, they are corrected.
+    SurfaceSums survey(double* residuals);
     /// From now on to the scan's end the normals of accepted points come without their components
     /// along the blind directions, but for those that may have proven themselves.
     void clean(const BlindDirections& blind, const NoiseAwareConfig& config);
+    /// The normal of a point that has not proven itself, where that is known already.
+    void tell(std::size_t i, const Vec3& cleaned) {
+        told_[i] = Told::kCleaned;
+        cleaned_[i] = cleaned.cast<float>();
+    }
+    bool surveyed() const { return surfaces_.surveyed(); }
     bool cleans() const { return test_.has_value(); }
-    /// Whether a point's normal came whole.
-    bool speaks(std::size_t i) const { return told_[i] == Told::kWhole; }
-    /// Whether a point has come with new neighbours since the last call.
-    bool searched() { return searched_.exchange(false); }
+    /// Whether an accepted point's normal is to come whole.
+    bool speaks(std::size_t i);
 
   private:
     Verdict fit(const Candidate& candidate, const Rejector& rejector);
-    void look_at(const Candidate& candidate, const PlaneMoments& moments);
     const Eigen::Vector3f& normal(std::size_t i);
-    float sag(std::size_t i, const Eigen::Vector3f& p) const;
-    bool in_sample(std::size_t i) const { return i % step_ == 0; }
 
     VerdictBook book_;
     std::vector<Plane> planes_;
-    Look look_ = Look::kNot;
-    std::size_t step_ = 1;      ///< from one point of the sample to the next
-    bool bends_known_ = false;  ///< of any facing
-    std::atomic<bool> searched_{false};
-    Eigen::Vector3f sensor_ = Eigen::Vector3f::Zero();
-    std::vector<Patch> patches_;
-    std::vector<char> has_patch_;  ///< not bool: threads write neighbouring entries
-    /// Of the surfaces from their planes at the points, as of the last search: it changes by less
-    /// than a millimetre within a scan.
-    std::vector<float> sags_;
+    bool looks_ = false;  ///< at surfaces
+    Surfaces surfaces_;
     std::vector<Eigen::Vector3f> points_;
-    BendField bends_;
 
     enum class Told : char { kUnknown, kCleaned, kWhole };
     std::optional<ProofTest> test_;
+    BlindDirections blind_;
     std::vector<Told> told_;                ///< of the point's normal
     std::vector<Eigen::Vector3f> cleaned_;  ///< normals
 };

@@ -196,9 +196,6 @@ class ScanToMap::UsedRows {
         const Row& row = rows_[used_[k]];
         return trust(row.residual / row.weight, normal, *patch(k), blind, options_.variance);
     }
-    void take_out(std::size_t k, const BlindDirections& blind, const Vec3& components) {
-        replace(k, {normal(k) - blind.axes * components, 1.0}, true);
-    }
     void replace(std::size_t k, const CleanedRow& cleaned, bool /*lost*/) {
         Row& row = rows_[used_[k]];
         const Vec3 kept = row.weight * cleaned.weight * cleaned.normal;
@@ -243,9 +240,9 @@ void ScanToMap::add_prior(const Pose& T, Mat6& AtA, Vec6& Atb) const {
 }
 
 /// How far the points of this place lie from its surfaces: walls to 2 cm, bushes to a decimetre.
-/// Beyond that a distance is a wrong match, and there are many along a street. While a scan is being
-/// moved to the map all its distances are long, and a kernel as narrow as the place would hold it
-/// where it is: at a start in motion, for good.
+/// Beyond that a distance is a wrong match, and there are many along a street. While a scan is
+/// being moved to the map all its distances are long, and a kernel as narrow as the place would
+/// hold it where it is: at a start in motion, for good.
 /// @param most share of the configured scale.
 void ScanToMap::learn_kernel(double most) {
     distances_.clear();

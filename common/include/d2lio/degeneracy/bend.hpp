@@ -13,6 +13,13 @@ namespace d2lio {
 /// @param leaf side of the voxel, m.
 constexpr double mean_spread(double leaf) { return leaf * leaf / 12.0; }
 
+/// How far a surface lies from its plane at a point, along the plane's normal (m), and how that
+/// changes from there.
+struct Sag {
+    float here = 0.F;
+    Eigen::Vector3f slope = Eigen::Vector3f::Zero();
+};
+
 /// Mean curvature of what the sensor sees, by the direction the surface faces (1/m, positive where
 /// it bends towards the sensor, as the vault of a tunnel does).
 ///
@@ -26,7 +33,13 @@ class BendField {
     /// Bend of a facing as learnt from earlier scans.
     float at(int facing) const { return bend_[static_cast<std::size_t>(facing)]; }
     bool any() const { return any_; }  ///< whether at() is not zero everywhere
-    void add(const Patch& patch);
+    void add(const Patch& patch) { add(patch.side.facing, patch.bend_rise, patch.bend_run); }
+    /// @param rise, run as in Patch.
+    void add(int facing, float rise, float run) {
+        const auto i = static_cast<std::size_t>(facing);
+        rise_[i] += static_cast<double>(rise);
+        run_[i] += static_cast<double>(run);
+    }
     /// How far the surface of a patch lies from its plane at p, along the plane's normal (m).
     /// @param spread of mean_spread(), where the neighbours are means.
     float sag(const Patch& patch, const Eigen::Vector3f& normal, const Eigen::Vector3f& p,

@@ -24,42 +24,31 @@ struct BlindDirections {
     Vec3 variance = Vec3::Zero();  ///< of the predicted position along each axis, m^2
 };
 
-/// Components of a row's normal along the blind directions.
-inline Vec3 components(const Vec3& normal, const BlindDirections& blind) {
-    Vec3 out = Vec3::Zero();
-    for (int i = 0; i < blind.count; ++i) out[i] = normal.dot(blind.axes.col(i));
-    return out;
-}
-
 /// Tells at little cost the many rows of which proven_share() is zero.
 class ProofTest {
   public:
     ProofTest(const BlindDirections& blind, const NoiseAwareConfig& config);
     bool may_pass(const Eigen::Vector3f& normal, const Patch& patch) const {
-        const float bound = least_ * patch.least_variance;
         for (int i = 0; i < count_; ++i) {
             const auto d = axes_.col(i);
-            const float a = normal.dot(d), square = a * a;
-            // Most are told by the bound: of the direction's square 1 - a^2 lies in the plane.
-            if (square <= bound * (1.F - square)) continue;
-            if (square > least_ * patch.formal_variance(d)) return true;
+            const float a = normal.dot(d);
+            if (a * a > least_ * patch.formal_variance(d)) return true;
+        }
+        return false;
+    }
+    /// Tells most rows without their patch: 1 - a^2 of a direction's square lies in the plane.
+    /// @param share of the bound that is enough.
+    bool may_pass(const Eigen::Vector3f& normal, float share = 1.F) const {
+        const float bound = share * least_ * Patch::kLeastVariance;
+        for (int i = 0; i < count_; ++i) {
+            const float a = normal.dot(axes_.col(i)), square = a * a;
+            if (square > bound * (1.F - square)) return true;
         }
         return false;
     }
 
-    /// The normal without its components along the blind directions, as far as those are cleaned.
-    Eigen::Vector3f without(const Eigen::Vector3f& normal) const {
-        Eigen::Vector3f out = normal;
-        for (int i = 0; i < count_; ++i) {
-            const auto d = axes_.col(i);
-            out -= blend_[i] * normal.dot(d) * d;
-        }
-        return out;
-    }
-
   private:
     Eigen::Matrix3f axes_;
-    Eigen::Vector3f blend_;
     int count_;
     float least_;  ///< ratio of a component's square to its variance
 };
@@ -96,8 +85,11 @@ class SurfaceSums {
     void add(const Vec3& normal, const Patch& patch) {
         const auto x = static_cast<float>(normal.x()), y = static_cast<float>(normal.y()),
                    z = static_cast<float>(normal.z());
-        n_.add(x * x, x * y, x * z, y * y, y * z, z * z);
-        const auto& c = patch.covariance;
+        add({x * x, x * y, x * z, y * y, y * z, z * z}, patch.covariance);
+    }
+    /// @param n, c of other rows; xx, xy, xz, yy, yz, zz.
+    void add(const std::array<float, 6>& n, const std::array<float, 6>& c) {
+        n_.add(n[0], n[1], n[2], n[3], n[4], n[5]);
         c_.add(c[0], c[1], c[2], c[3], c[4], c[5]);
     }
 

@@ -13,9 +13,8 @@ namespace d2lio {
 ///
 /// `Rows` gives `size()`; `normal(k)`, map frame; `patch(k)`, null where there is none, as of a
 /// line, which cannot prove anything: of its neighbours nothing is known but the line;
-/// `trusted(k, normal, blind)`, see trust(); `take_out(k, blind, a)`, called where all that the row
-/// loses are the components `a` of its normal along the blind directions; and
-/// `replace(k, cleaned, lost)`, where more changes, `lost` telling whether the normal does.
+/// `trusted(k, normal, blind)`, see trust(); and `replace(k, cleaned, lost)`, called where
+/// something changes, `lost` telling whether the normal does.
 class RowCleaner {
   public:
     template <typename Rows>
@@ -36,16 +35,17 @@ class RowCleaner {
         const ProofTest test(blind, config);
         for (std::size_t k = 0; k < rows.size(); ++k) {
             const Vec3 n = rows.normal(k);
-            const Patch* patch = rows.patch(k);
-            if (patch != nullptr && test.may_pass(n.cast<float>(), *patch)) {
+            const Eigen::Vector3f single = n.cast<float>();
+            const Patch* patch = test.may_pass(single) ? rows.patch(k) : nullptr;
+            if (patch != nullptr && test.may_pass(single, *patch)) {
                 const Vec3 share = proven_share(n, *patch, blind, config);
                 sum.add(n, share, blind);
                 speaking_.push_back({k, share});
                 continue;
             }
-            const Vec3 loss = blind.blend.cwiseProduct(components(n, blind));
-            if (loss.isZero(0.0)) continue;
-            rows.take_out(k, blind, loss);
+            const Vec3 kept = without(n, blind);
+            if (kept == n) continue;
+            rows.replace(k, {kept, 1.0}, true);
             ++lost;
         }
         for (const Speaking& row : speaking_) {  // their weight hangs on how many they are

@@ -20,21 +20,29 @@ struct SurfaceSide {
 };
 
 /// @param to_sensor from any point of the plane.
-SurfaceSide side_of(const Eigen::Vector3f& normal, const Eigen::Vector3f& to_sensor);
+inline SurfaceSide side_of(const Eigen::Vector3f& normal, const Eigen::Vector3f& to_sensor) {
+    const float sign = normal.dot(to_sensor) < 0.F ? -1.F : 1.F;
+    const auto quarter = [sign](float v) {  // sums of comparisons need no branch
+        const float u = sign * v;
+        return static_cast<int>(u >= -0.5F) + static_cast<int>(u >= 0.F) +
+               static_cast<int>(u >= 0.5F);
+    };
+    return {sign, (quarter(normal.x()) * 4 + quarter(normal.y())) * 4 + quarter(normal.z())};
+}
 
 /// What the neighbours of a plane fit say about the surface beside its plane: how uncertain the
 /// normal is, and how the surface bends. Map frame, m.
 struct Patch {
     static constexpr int kCount = 5;  ///< neighbours
+    /// rad^2. No direction in the plane has a smaller formal_variance(): neighbours that lie
+    /// farther apart fix the normal better, but leave more room for a bend.
+    static constexpr float kLeastVariance = 0.002F;
 
     Eigen::Vector3f centroid = Eigen::Vector3f::Zero();
     std::array<float, 3 * kCount> offsets{};  ///< of the neighbours from the centroid
     float variance = 0.F;                     ///< of a neighbour's height
     /// Covariance of the unit normal, which lies in the plane: xx, xy, xz, yy, yz, zz; rad^2.
     std::array<float, 6> covariance{};
-    /// No direction in the plane has a smaller formal_variance() (rad^2): a bound, which is
-    /// quicker.
-    float least_variance = 0.F;
     /// Regression of the neighbours' distances from the plane on their squared distances from the
     /// centroid: the bend is bend_rise / bend_run (1/m), its variance sigma^2 / bend_run.
     float bend_rise = 0.F;  ///< m^3

@@ -34,6 +34,8 @@ struct PlaneMoments {
     Eigen::Vector3f centroid = Eigen::Vector3f::Zero();  ///< m
     /// About the centroid, not divided by the number of points: xx, xy, xz, yy, yz, zz; m^2.
     std::array<float, 6> scatter{};
+
+    float trace() const { return scatter[0] + scatter[3] + scatter[5]; }
 };
 
 /// Fits the plane that minimises sum_i (u . x_i + 1)^2, the form FAST-LIO2 uses, in closed form.

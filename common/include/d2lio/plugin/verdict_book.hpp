@@ -2,6 +2,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
+#include <algorithm>
 #include <cstddef>
 #include <vector>
 
@@ -16,6 +17,9 @@ class VerdictBook {
   public:
     void begin_scan(std::size_t points);
     std::size_t size() const { return verdicts_.size(); }
+    int accepted() const {
+        return static_cast<int>(std::count(verdicts_.begin(), verdicts_.end(), Verdict::kAccepted));
+    }
     Verdict& verdict(std::size_t i) { return verdicts_[i]; }
     const std::vector<Verdict>& verdicts() const { return verdicts_; }
     void set_threshold(std::size_t i, double threshold) {

@@ -42,8 +42,10 @@ struct Candidate {
 };
 
 struct Correspondence {
-    float normal[3];  ///< of the fitted plane, map frame, unit length
-    float residual;   ///< signed point-to-plane distance
+    /// Of the fitted plane, map frame, unit length; with method noise_aware from the second
+    /// iteration on without what noise may have put into it.
+    float normal[3];
+    float residual;  ///< signed point-to-plane distance
 };
 
 /// Stacked rows of the accepted correspondences: entry (r, c) lies at jacobian[r * row_step + c *

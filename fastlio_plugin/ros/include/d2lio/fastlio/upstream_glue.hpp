@@ -62,7 +62,7 @@ class UpstreamGlue {
     bool decides() const { return adapter_.rejects() || adapter_.reads_surfaces(); }
 
     /// @param fresh the neighbours come from a new search; only then are `sq_distances` read.
-    /// @param plane on acceptance gets the unit normal in x, y, z and the signed distance (m) in
+    /// @param plane on acceptance gets the normal in x, y, z and the signed distance (m) in
     /// intensity. Any thread, one point each.
     template <class State, class Vec, class Point, class Points>
     bool accept(int i, bool fresh, const State& x, const Vec& p_lidar, const Point& p_map,
