@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include <Eigen/LU>
+#include <algorithm>
 #include <cmath>
 #include <limits>
 
@@ -138,6 +139,28 @@ TEST(Ieskf, NonFiniteRowsAndIndefinitePriorsAreRefused) {
     P(4, 4) = -1.0;
     EXPECT_EQ(Ieskf(options()).update(x, P, measure).status, UpdateStatus::kNumericalFailure);
     EXPECT_TRUE(x.is_finite());
+}
+
+/// A pose that has moved less than the limit is not searched at twice; one that has, is.
+TEST(Ieskf, SearchesOnceWhereThePoseStays) {
+    test::Random random(7);
+    for (const double size : {1e-4, 2e-2}) {
+        IeskfOptions once = options();
+        once.searches_once = true;
+        std::vector<bool> searches;
+        NavState x;
+        const NavState truth = state_plus(x, Vec23::Constant(size));
+        Mat23x23 P = Mat23x23::Identity();
+        const LinearMeasure measure(random, 200, truth);
+        const auto counted = [&](const NavState& s, bool search, Linearisation& out) {
+            searches.push_back(search);
+            return measure(s, search, out);
+        };
+        const UpdateReport report = Ieskf(once).update(x, P, counted);
+        EXPECT_TRUE(report.converged);
+        EXPECT_EQ(std::count(searches.begin(), searches.end(), true), size < 1e-3 ? 1 : 2);
+        EXPECT_LT((x.pos - truth.pos).norm(), 0.1 * size);
+    }
 }
 
 TEST(Ieskf, SearchesAgainOnlyAfterASmallStepAndOnTheLastPass) {

@@ -37,11 +37,12 @@ struct Prediction {
     Mat23x23 P;
 };
 
-IeskfOptions filter_options(const HostConfig& c) {
+IeskfOptions filter_options(const HostConfig& c, bool noise_aware) {
     IeskfOptions o;
     o.max_iteration = c.max_iteration;
     o.variance = kPointVariance;
     o.exact_jacobians = c.exact_jacobians;
+    o.searches_once = noise_aware;
     return o;
 }
 
@@ -55,7 +56,7 @@ class Host::Impl {
           intake_(config_.intake),
           imu_(config_),
           map_(config_),
-          ieskf_(filter_options(config_)),
+          ieskf_(filter_options(config_, adapter_.reads_surfaces())),
           matcher_(adapter_, config_.extrinsic_est, kPointVariance, config_.threads) {}
 
     std::optional<ScanResult> step();

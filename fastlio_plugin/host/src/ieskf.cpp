@@ -102,11 +102,16 @@ UpdateReport Ieskf::update(NavState& x, Mat23x23& P, const Measure& measure) {
         return report;
     };
     bool search = true;
+    NavState searched = x;
+    const auto stays = [&] {
+        return state_minus(x, searched).head<6>().cwiseAbs().maxCoeff() <= options_.limit;
+    };
     int converged_steps = 0;
     Mat23x23 P_here = predicted_P;  // the prediction's covariance in the tangent space at x
     Vec23 dx = Vec23::Zero();
     const int passes = options_.max_iteration + 1;  // as FAST-LIO2 counts
     for (int i = 0; i < passes; ++i) {
+        if (search) searched = x;
         if (!measure(x, search, rows_)) continue;
         const Vec23 d = state_minus(x, predicted);
         const Mat23x23 J = state_transport(predicted, d, options_.exact_jacobians);
@@ -117,6 +122,7 @@ UpdateReport Ieskf::update(NavState& x, Mat23x23& P, const Measure& measure) {
         report.status = UpdateStatus::kOk;
         search = dx.cwiseAbs().maxCoeff() <= options_.limit;
         if (search) ++converged_steps;
+        if (search && options_.searches_once && stays()) break;
         if (converged_steps == 0 && i == passes - 2)
             search = true;  // last pass sees new neighbours
         if (converged_steps > 1) break;

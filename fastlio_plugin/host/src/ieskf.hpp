@@ -30,6 +30,9 @@ struct IeskfOptions {
     double variance = 0.001;  ///< of every row, m^2 (FAST-LIO2: LASER_POINT_COV)
     double limit = 0.001;     ///< convergence limit of every error state
     bool exact_jacobians = false;
+    /// Ends where the pose has moved by less than the limit since the last search; FAST-LIO2
+    /// searches again then, and finds nearly the same neighbours.
+    bool searches_once = false;
 };
 
 enum class UpdateStatus {

@@ -52,7 +52,7 @@ struct Correspondence {
 /// column_step]. Columns position..position + 2 and rotation..rotation + 2 hold the pose blocks.
 struct Rows {
     double* jacobian;
-    double* residual;
+    double* residual;  ///< the negative distances that accept() gave
     int count;
     std::ptrdiff_t row_step, column_step;
     int position_column, rotation_column;
@@ -74,8 +74,8 @@ class Adapter : public Plugin {
     Status begin_scan(const ScanInput& input);
     /// Decides on one point; on kAccepted fills `out`. A rejected point stays out until `fresh`.
     Verdict accept(const Candidate& candidate, Correspondence* out);
-    /// Analyses the rows, projects them where the method asks for it, and returns the rows to
-    /// append.
+    /// Analyses the rows, projects them and corrects their residuals where the method asks for it,
+    /// and returns the rows to append.
     /// @param variance of the rows' measurements (FAST-LIO2: 0.001 m^2).
     Status condition(const Rows& rows, const PoseView& pose, double variance, PriorBlock* prior);
     /// @param covariance posterior, corrected in place so that it does not claim the prior's
