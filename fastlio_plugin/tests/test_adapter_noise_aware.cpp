@@ -8,6 +8,7 @@
 #include <string>
 #include <vector>
 
+#include "d2lio/degeneracy/scan_error.hpp"
 #include "d2lio/diagnostics/scan_diagnostics.hpp"
 #include "d2lio/fastlio/adapter.hpp"
 #include "noise_tunnel.hpp"
@@ -190,6 +191,18 @@ TEST(NoiseAware, AFilterThatDidNotBeginAtRestGetsItsFirstScansWhole) {
     noise_aware(a, kSettling - 1);
     EXPECT_FALSE(solve(a, Tunnel(0)).touched());
     EXPECT_TRUE(solve(a, Tunnel(0)).touched());
+}
+
+TEST(NoiseAware, AScanHasNoErrorOfItsOwnWhileTheVelocityIsLearnt) {
+    Adapter a;
+    noise_aware(a, kSettling);
+    EXPECT_EQ(a.scan_error(1.0).rotation, 0.0);
+    pass_scans(a, 1);
+    EXPECT_GT(a.scan_error(1.0).rotation, 0.0);
+    Adapter rested;
+    noise_aware(rested, 0);
+    pass_scans(rested, 1, true);
+    EXPECT_GT(rested.scan_error(1.0).rotation, 0.0);
 }
 
 TEST(NoiseAware, AfterARestItActsFromTheFirstMotionOn) {

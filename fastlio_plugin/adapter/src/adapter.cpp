@@ -218,6 +218,10 @@ Status Adapter::end_scan(const PoseView& posterior, bool converged, double* cova
     return status;
 }
 
+ScanError Adapter::scan_error(double misfit) const {
+    return impl_->settled() ? Plugin::scan_error(misfit) : ScanError{};
+}
+
 void Adapter::reset() {
     Plugin::reset();
     impl_->gate.reset();

@@ -81,6 +81,8 @@ class Adapter : public Plugin {
     /// @param covariance posterior, corrected in place so that it does not claim the prior's
     /// information (degeneracy.inflate_only); may be null.
     Status end_scan(const PoseView& posterior, bool converged, double* covariance, int size);
+    /// Plugin::scan_error(); none while a filter that did not begin at rest learns its velocity.
+    ScanError scan_error(double misfit) const;
     /// Plugin::reset(), and what was learnt of the surfaces.
     void reset();
 
