@@ -197,8 +197,8 @@ TEST(ScanToMap, InformationIsTheSecondDerivativeOfTheCost) {
     }
 }
 
-/// After scans that fitted to millimetres the kernel is narrow; then the guess is 1.1 m and 18 degrees
-/// off, as at a start in motion.
+/// After scans that fitted to millimetres the kernel is narrow; then the guess is 1.1 m and 18
+/// degrees off, as at a start in motion.
 TEST(ScanToMap, ANarrowKernelDoesNotHoldAScanThatIsFarFromTheMap) {
     Box box;
     box.options.kernel_scale = 0.1;
