@@ -86,7 +86,8 @@ TEST(NoiseAware, AScanAfterOneThatSawWellIsLookedAtByASampleAndJudgedFromTheNext
     EXPECT_TRUE(inside.touched());
     const Solved leaving = solve(a, Tunnel(60));  // every surface is looked at once more
     EXPECT_EQ(leaving.told.blind, 0);
-    EXPECT_EQ(leaving.before, leaving.after);
+    EXPECT_EQ(leaving.told.cleaned, 0);
+    EXPECT_EQ(leaving.before, leaving.after);  // residuals may lose the sag of a bend
 }
 
 TEST(NoiseAware, AnAxisThatWasBlindStaysSoWhileItWavers) {

@@ -24,9 +24,10 @@ constexpr double kWeightSlope = 0.9;    ///< of LIO-SAM's s
 constexpr float kInfinity = std::numeric_limits<float>::infinity();
 
 /// The kernel's scale by the upper quartile of the distances (2.3 sigma of normal ones), and its
-/// limits in shares of what is configured: from scan to scan, and within one that is still moving.
+/// limits in shares of what is configured, the upper one within a scan that is still moving; from
+/// scan to scan it is 1.
 constexpr double kQuartile = 0.75, kKernelByQuartile = 2.0;
-constexpr double kLeastKernel = 0.3, kMostKernel = 1.0, kMostKernelWithin = 5.0;
+constexpr double kLeastKernel = 0.3, kMostKernelWithin = 5.0;
 
 constexpr double kDegree = 57.29577951308232;
 constexpr double kCentimetre = 100.0;
@@ -243,8 +244,7 @@ void ScanToMap::add_prior(const Pose& T, Mat6& AtA, Vec6& Atb) const {
 /// Beyond that a distance is a wrong match, and there are many along a street. While a scan is
 /// being moved to the map all its distances are long, and a kernel as narrow as the place would
 /// hold it where it is: at a start in motion, for good.
-/// @param most share of the configured scale.
-void ScanToMap::learn_kernel(double most) {
+void ScanToMap::learn_kernel() {
     distances_.clear();
     for (const Row& row : rows_) {
         if (row.used) distances_.push_back(std::abs(row.residual / row.weight));
@@ -254,7 +254,7 @@ void ScanToMap::learn_kernel(double most) {
     const auto quartile = distances_.begin() + static_cast<std::ptrdiff_t>(rank);
     std::nth_element(distances_.begin(), quartile, distances_.end());
     kernel_scale_ = std::clamp(kKernelByQuartile * *quartile, kLeastKernel * options_.kernel_scale,
-                               most * options_.kernel_scale);
+                               kMostKernelWithin * options_.kernel_scale);
 }
 
 void ScanToMap::learn_bends() {
@@ -285,6 +285,7 @@ bool ScanToMap::step(const MatchInput& input, Pose& T, MatchReport& report) {
     Vec6 Atb;
     StopWatch watch;
     const int used = linearise(input, T, AtA, Atb);
+    if (adapter_.reads_surfaces()) learn_kernel();
     report.search_ms += watch.lap();
     if (used < options_.min_rows) {
         report.status = MatchStatus::kFewRows;
@@ -308,7 +309,6 @@ bool ScanToMap::step(const MatchInput& input, Pose& T, MatchReport& report) {
         return false;
     }
     T = next;
-    if (adapter_.reads_surfaces()) learn_kernel(kMostKernelWithin);
     report.status = MatchStatus::kOk;
     report.converged = d.head<3>().norm() * kDegree < options_.rotation_epsilon &&
                        d.tail<3>().norm() * kCentimetre < options_.translation_epsilon;
@@ -330,7 +330,7 @@ MatchReport ScanToMap::align(const MatchInput& input, Pose& T_map_imu, const Mat
     if (adapter_.reads_surfaces()) {
         report.mean_square = mean_square();
         learn_bends();
-        learn_kernel(kMostKernel);
+        kernel_scale_ = std::min(kernel_scale_, options_.kernel_scale);
     }
     return report;
 }

@@ -117,7 +117,7 @@ class ScanToMap {
     void limit(Mat6& AtA, Vec6& Atb) const;
     void add_prior(const Pose& T, Mat6& AtA, Vec6& Atb) const;
     void learn_bends();
-    void learn_kernel(double most);
+    void learn_kernel();
 
     Adapter& adapter_;
     MatchOptions options_;

@@ -37,9 +37,8 @@ class ProofTest {
         return false;
     }
     /// Tells most rows without their patch: 1 - a^2 of a direction's square lies in the plane.
-    /// @param share of the bound that is enough.
-    bool may_pass(const Eigen::Vector3f& normal, float share = 1.F) const {
-        const float bound = share * least_ * Patch::kLeastVariance;
+    bool may_pass(const Eigen::Vector3f& normal) const {
+        const float bound = least_ * Patch::kLeastVariance;
         for (int i = 0; i < count_; ++i) {
             const float a = normal.dot(axes_.col(i)), square = a * a;
             if (square > bound * (1.F - square)) return true;
